@@ -1,0 +1,57 @@
+# `make reproduce` and `make test` each set everything up by themselves; they need python3 (3.11 to 3.13) with venv, and make.
+
+# Which Python makes .venv; empty: python3, or whichever of 3.11 to 3.13 is there.
+PYTHON ?=
+BUDGET ?= paper
+# Folder of the real captures (README says where to get them); without it `real_boards` says that they are absent.
+REAL_BOARDS ?=
+# Test processes at once, each with one thread.
+JOBS ?= 2
+
+BIN := .venv/bin
+STAMP := .venv/.complete
+SOURCES := deskew data_synth experiments tests
+EXPERIMENTS := plane_accuracy corner_distance real_boards
+
+# What a run at this budget may overwrite: smoke proves that it runs and never touches the committed reports.
+REPORTS = $(if $(filter smoke,$(BUDGET)),out/smoke,reports)
+
+.PHONY: setup reproduce $(EXPERIMENTS) test lint format lock clean help
+
+help: ## list the targets
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+
+setup: $(STAMP) ## make .venv with the locked packages (PYTHON=python3.12 chooses another Python)
+
+$(STAMP): requirements.lock pyproject.toml
+	@.ci/setup "$(PYTHON)"
+
+reproduce: $(EXPERIMENTS) ## run every experiment and regenerate reports/ (BUDGET=smoke|paper|full)
+
+# One after another, whatever -j says: each uses all cores by itself.
+.NOTPARALLEL:
+
+$(EXPERIMENTS): $(STAMP)
+	@$(BIN)/python -m experiments experiment=$@ budget=$(BUDGET) out=$(REPORTS)/$@ \
+		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)'))
+
+test: $(STAMP) ## run the tests
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=$(JOBS) --dist=worksteal
+
+lint: $(STAMP) ## check style, types and who imports whom
+	@$(BIN)/ruff check $(SOURCES)
+	@$(BIN)/ruff format --check $(SOURCES)
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+format: $(STAMP) ## set the sources in the project's format
+	@$(BIN)/ruff check --fix $(SOURCES)
+	@$(BIN)/ruff format $(SOURCES)
+
+lock: ## pin the newest allowed packages with their hashes (needs uv); no index address goes into the file
+	uv pip compile --quiet --upgrade pyproject.toml --universal --python-version 3.11 --all-extras --generate-hashes \
+		--no-annotate --no-header --no-emit-index-url --output-file requirements.lock
+
+clean: ## remove .venv and what the tools cached
+	rm -rf .venv build dist *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	find $(SOURCES) -name __pycache__ -type d -exec rm -rf {} +

@@ -1,0 +1,38 @@
+"""The synthetic rig: sheets of known shape, pages of known print, and a bench that photographs them with the truth.
+
+It shares no mathematics with the reconstruction, so that a common error cannot cancel.
+"""
+
+from data_synth.boards import BOARD, BoardPose, board_poses, render_board
+from data_synth.folds import View, crumpled
+from data_synth.pages import Blank, Checkerboard, Page, board_page
+from data_synth.render import photograph, render
+from data_synth.rig import Rig, RigConfig, default_rig
+from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
+from data_synth.truth import Truth
+
+__all__ = [
+    "BOARD",
+    "PAGE_SIZE_MM",
+    "Blank",
+    "BoardPose",
+    "Checkerboard",
+    "Page",
+    "Rig",
+    "RigConfig",
+    "TrueSheet",
+    "Truth",
+    "View",
+    "board_page",
+    "board_poses",
+    "crumpled",
+    "default_rig",
+    "dome",
+    "flat_sheet",
+    "photograph",
+    "plane",
+    "posed",
+    "render",
+    "render_board",
+    "tent",
+]

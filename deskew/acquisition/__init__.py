@@ -1,0 +1,52 @@
+"""From a capture to a depth map and a mesh (section 2): corners, calibration, decoding, culling, triangulation."""
+
+from deskew.acquisition.accuracy import (
+    PlaneDeviation,
+    average_deviation,
+    depth_points,
+    fit_plane,
+    length_errors,
+    plane_deviation,
+)
+from deskew.acquisition.calibration import BoardView, board_points, calibrate, view_board
+from deskew.acquisition.corners import (
+    find_board,
+    kitchen_rosenfeld_peaks,
+    refine_kitchen_rosenfeld,
+    refine_saddle,
+)
+from deskew.acquisition.depthmap import DepthSettings, depth_map
+from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
+from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
+from deskew.acquisition.outline import Outline, page_outline, straight_outline
+from deskew.acquisition.stripes import decode_sweep
+from deskew.acquisition.sweep import SweepSettings
+
+__all__ = [
+    "BoardView",
+    "DepthSettings",
+    "GrayCodeSettings",
+    "Outline",
+    "PageMesh",
+    "PlaneDeviation",
+    "SweepSettings",
+    "average_deviation",
+    "board_points",
+    "calibrate",
+    "decode_gray",
+    "decode_sweep",
+    "depth_map",
+    "depth_points",
+    "find_board",
+    "fit_plane",
+    "kitchen_rosenfeld_peaks",
+    "length_errors",
+    "page_mesh",
+    "page_outline",
+    "page_sheet",
+    "plane_deviation",
+    "refine_kitchen_rosenfeld",
+    "refine_saddle",
+    "straight_outline",
+    "view_board",
+]

@@ -1,0 +1,230 @@
+"""Bundle adjustment of camera, projector, their relation and all board poses (section 2.2).
+
+Two kinds of residual, each divided by its own noise level: a board corner's reprojection into the camera, and, for
+each decoded camera pixel, the projector coordinates of the point where its ray meets the board's plane. The pixels'
+positions are exact, so no projector coordinate has to be interpolated to a corner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from deskew.errors import StepError
+from deskew.projection import project, undistort
+from deskew.types import Floats, Pinhole
+
+Ints = npt.NDArray[np.intp]
+
+INTRINSICS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2")
+_POSE = 6
+_CAMERA, _PROJECTOR, _STEREO = slice(0, 8), slice(8, 16), slice(16, 22)
+_SHARED = 22  # parameters before the poses
+_REJECT_SIGMAS = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Observations:
+    """What the bundle explains.
+
+    Attributes
+    ----------
+    points : (N, 3) array
+        Corners in the board's frame.
+    corners : (P, N, 2) array
+        The same corners in the camera, for each pose [px].
+    pixels, projected : (S, 2) arrays
+        Camera pixels on the board and their projector coordinates [px], all poses together.
+    pose : (S,) int array
+        The pose that each belongs to.
+    n_independent : float
+        How many of the S pixels count as independent observations: the pixels of one square share the board's
+        unevenness there and the decoder's systematic error, so that they count as one together.
+    """
+
+    points: Floats
+    corners: Floats
+    pixels: Floats
+    projected: Floats
+    pose: Ints
+    n_independent: float
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """A solution.
+
+    Attributes
+    ----------
+    camera : Pinhole
+        At the origin, looking along +Z.
+    projector : Pinhole
+        In the camera's frame.
+    poses : (P, 6) array
+        Rotation vector [rad] and translation of each board in the camera's frame.
+    """
+
+    camera: Pinhole
+    projector: Pinhole
+    poses: Floats
+
+    def packed(self) -> Floats:
+        """All parameters in one vector: intrinsics of both, stereo relation, poses."""
+        stereo = np.concatenate([Rotation.from_matrix(self.projector.R).as_rotvec(), self.projector.t])
+        return np.concatenate([_intrinsics(self.camera), _intrinsics(self.projector), stereo, self.poses.ravel()])
+
+    def unpacked(self, parameters: Floats) -> Bundle:
+        """Return the solution that `parameters`, laid out as in :meth:`packed`, stands for."""
+        camera = _with_intrinsics(self.camera, parameters[_CAMERA])
+        projector = _with_intrinsics(self.projector, parameters[_PROJECTOR])
+        stereo = parameters[_STEREO]
+        projector = replace(projector, R=Rotation.from_rotvec(stereo[:3]).as_matrix(), t=stereo[3:])
+        return Bundle(camera, projector, parameters[_SHARED:].reshape(-1, _POSE))
+
+
+@dataclass(frozen=True, slots=True)
+class Refined:
+    """A converged bundle.
+
+    Attributes
+    ----------
+    bundle : Bundle
+        The solution.
+    corner_residuals : (P, N, 2) array
+        Reprojection minus observation [camera px].
+    pixel_residuals : (S, 2) array
+        Likewise [projector px].
+    kept : (S,) bool array
+        Pixels that are not outliers.
+    deviations : (22 + 6 P,) array
+        One standard deviation of each parameter.
+    """
+
+    bundle: Bundle
+    corner_residuals: Floats
+    pixel_residuals: Floats
+    kept: npt.NDArray[np.bool_]
+    deviations: Floats
+
+
+def _intrinsics(device: Pinhole) -> Floats:
+    K = device.K
+    return np.concatenate([[K[0, 0], K[1, 1], K[0, 2], K[1, 2]], device.distortion[:4]])
+
+
+def _with_intrinsics(device: Pinhole, values: Floats) -> Pinhole:
+    fx, fy, cx, cy = values[:4]
+    K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    return replace(device, K=K, distortion=np.append(values[4:], 0.0))
+
+
+def corner_residuals(bundle: Bundle, seen: Observations) -> Floats:
+    """Reprojection minus observation of every corner, (P, N, 2) [camera px]."""
+    rotations = Rotation.from_rotvec(bundle.poses[:, :3]).as_matrix()
+    placed = np.einsum("pij,nj->pni", rotations, seen.points) + bundle.poses[:, None, 3:]
+    return project(bundle.camera, placed) - seen.corners
+
+
+def on_board(bundle: Bundle, pixels: Floats, pose: Ints) -> Floats:
+    """Points where the rays of camera pixels meet their board's plane, (S, 3) in the camera's frame."""
+    normals = Rotation.from_rotvec(bundle.poses[:, :3]).as_matrix()[:, :, 2]
+    offsets = np.einsum("pi,pi->p", normals, bundle.poses[:, 3:])
+    rays = np.concatenate([undistort(bundle.camera, pixels), np.ones((len(pixels), 1))], axis=-1)
+    return np.asarray(rays * (offsets[pose] / np.einsum("si,si->s", normals[pose], rays))[:, None])
+
+
+def pixel_residuals(bundle: Bundle, seen: Observations) -> Floats:
+    """Projector coordinates predicted minus decoded, (S, 2) [projector px]."""
+    return project(bundle.projector, on_board(bundle, seen.pixels, seen.pose)) - seen.projected
+
+
+def refine(start: Bundle, seen: Observations) -> Refined:
+    """Refine to convergence: once with equal weights, then with each kind's own noise level and without outliers.
+
+    Raises
+    ------
+    StepError
+        If the bundle does not converge, or the poses leave a parameter undetermined.
+    """
+    kept = np.ones(len(seen.pixels), dtype=bool)
+    shared = float(np.sqrt(len(seen.pixels) / seen.n_independent))
+    sigmas = (1.0, shared)
+    bundle = start
+    for _ in range(3):
+        bundle, jacobian = _solve(bundle, _subset(seen, kept), sigmas)
+        corner, pixel = corner_residuals(bundle, seen), pixel_residuals(bundle, seen)
+        sigma_pixel = 1.4826 * float(np.median(np.abs(pixel)))
+        kept = np.abs(pixel).max(axis=-1) < _REJECT_SIGMAS * _floor(sigma_pixel)
+        sigmas = (
+            _floor(float(np.sqrt(np.mean(corner**2)))),
+            shared * _floor(float(np.sqrt(np.mean(pixel[kept] ** 2)))),
+        )
+    return Refined(bundle, corner, pixel, kept, _deviations(jacobian))
+
+
+def _deviations(jacobian: Floats) -> Floats:
+    """One standard deviation of each parameter, from the Jacobian of residuals in units of their noise."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    normal = (jacobian / scale).T @ (jacobian / scale)
+    if not np.linalg.cond(normal) < 1e14:
+        raise StepError(
+            "calibration: the poses leave a parameter undetermined; add poses tilted by 15 to 30 degrees about "
+            "different axes and at different heights."
+        )
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(normal))) / scale)
+
+
+def _floor(sigma_px: float) -> float:
+    return max(sigma_px, 1e-3)  # noise-free data must not divide by zero
+
+
+def _subset(seen: Observations, kept: npt.NDArray[np.bool_]) -> Observations:
+    return replace(seen, pixels=seen.pixels[kept], projected=seen.projected[kept], pose=seen.pose[kept])
+
+
+def _solve(start: Bundle, seen: Observations, sigmas: tuple[float, float]) -> tuple[Bundle, Floats]:
+    """Solve one weighted least-squares problem; returns the solution and its Jacobian."""
+
+    def residuals(parameters: Floats) -> Floats:
+        bundle = start.unpacked(parameters)
+        corner, pixel = corner_residuals(bundle, seen), pixel_residuals(bundle, seen)
+        return np.concatenate([corner.ravel() / sigmas[0], pixel.ravel() / sigmas[1]])
+
+    n_poses, n_points = seen.corners.shape[:2]
+    rows = np.concatenate([np.repeat(np.arange(n_poses), 2 * n_points), np.repeat(seen.pose, 2)])
+
+    def jacobian(parameters: Floats) -> Floats:
+        return _grouped_jacobian(residuals, parameters, rows, n_poses)
+
+    first = start.packed()
+    solution = least_squares(
+        residuals, first, jac=jacobian, x_scale="jac", xtol=1e-10, ftol=1e-12, gtol=1e-10, max_nfev=100
+    )
+    if not solution.success or not np.isfinite(solution.x).all():
+        raise StepError(
+            f"calibration: the bundle adjustment did not converge ({solution.message}); check the board's "
+            "shape and add poses."
+        )
+    return start.unpacked(solution.x), solution.jac
+
+
+def _grouped_jacobian(residuals: Callable[[Floats], Floats], parameters: Floats, rows: Ints, n_poses: int) -> Floats:
+    """Central differences; one pair of evaluations serves the same parameter of all poses, which share no residual."""
+    jacobian = np.zeros((len(rows), len(parameters)))
+    step = 1e-6 * np.maximum(np.abs(parameters), 1e-2)
+    for column in range(_SHARED + _POSE):
+        columns = np.array([column]) if column < _SHARED else column + _POSE * np.arange(n_poses)
+        shift = np.zeros_like(parameters)
+        shift[columns] = step[columns]
+        difference = residuals(parameters + shift) - residuals(parameters - shift)
+        if column < _SHARED:
+            jacobian[:, column] = difference / (2 * step[column])
+        else:
+            own = columns[rows]
+            jacobian[np.arange(len(rows)), own] = difference / (2 * step[own])
+    return jacobian

@@ -1,0 +1,189 @@
+"""Gray-code decoding with inverse patterns, to a fraction of a projector pixel (section 2.3's "active encoding").
+
+Frame 2b of a sweep shows bit b of the Gray code of each projector column (or row), most significant first; frame
+2b + 1 its inverse. Their difference cancels albedo and ambient light: its sign is the bit, and the place where it
+crosses zero between two neighbouring camera pixels is the border between two projector pixels, to a sub-pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from scipy import ndimage
+
+from deskew.acquisition.corners import luminance
+from deskew.errors import require
+from deskew.types import Array, Capture, Correspondence, Floats, Frames, PatternKind, Reason
+
+_ROUNDING = float(1 / np.sqrt(12))  # no camera is quieter than the rounding of its grey levels
+
+
+@dataclass(frozen=True, slots=True)
+class GrayCodeSettings:
+    """Thresholds of the decoder, in standard deviations of the noise that the frames themselves show.
+
+    Attributes
+    ----------
+    shadow_snr : float
+        Least white minus black of a lit pixel, over the noise of one frame.
+    bit_snr : float
+        Least |pattern - inverse| of a bit, over the noise of that difference. One bit may be fainter: it is grey where
+        the pixel lies on its border. Two make the pixel `WEAK`.
+    gap_max_px : int
+        Widest stretch of camera pixels between two borders that is interpolated.
+    ink_slope_max : float
+        Steepest relative change of white minus black [1/px]; where it is steeper, at the edge of ink, a lens of blur
+        sigma bends borders by sigma^2 times it, and the pixel is `EDGE`.
+    n_dropped_max : int
+        Finest bits that may be done without where a projector out of focus washes them out.
+    subpixel : bool
+        Interpolate between borders; otherwise the index of the projector pixel is the coordinate.
+    """
+
+    shadow_snr: float = 4.0
+    bit_snr: float = 3.0
+    gap_max_px: int = 16
+    ink_slope_max: float = 0.15
+    n_dropped_max: int = 2
+    subpixel: bool = True
+
+    def __post_init__(self) -> None:
+        require(self.shadow_snr > 0, "shadow_snr", "be positive", self.shadow_snr)
+        require(self.bit_snr > 0, "bit_snr", "be positive", self.bit_snr)
+        require(self.gap_max_px >= 2, "gap_max_px", "be at least 2", self.gap_max_px)
+        require(self.ink_slope_max > 0, "ink_slope_max", "be positive [1/px]", self.ink_slope_max)
+        require(self.n_dropped_max >= 0, "n_dropped_max", "be at least 0", self.n_dropped_max)
+
+
+def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> Correspondence:
+    """Decode a Gray-code capture.
+
+    Parameters
+    ----------
+    capture : Capture
+        Of kind `GRAY_CODE`.
+    settings : GrayCodeSettings, optional
+        Thresholds.
+
+    Returns
+    -------
+    Correspondence
+        Projector coordinates [px] at raw camera pixels.
+    """
+    require(capture.pattern is PatternKind.GRAY_CODE, "capture", "hold a Gray code", capture.pattern)
+    settings = settings or GrayCodeSettings()
+    white, black = luminance(capture.white), luminance(capture.black)
+    columns, noise = _differences(capture.columns, white + black)
+    rows, _ = _differences(capture.rows, white + black)
+    shadow = white - black < settings.shadow_snr * noise
+    # A border between rows runs along the image's x: transpose, so that both sweeps are read along the last axis.
+    column = _decode_axis(columns, shadow, noise, capture.projector_size[0], settings)
+    row = _decode_axis(rows.transpose(0, 2, 1), shadow.T, noise.T, capture.projector_size[1], settings).T
+    reason = np.full(shadow.shape, Reason.OK, dtype=np.uint8)
+    reason[~np.isfinite(column) | ~np.isfinite(row)] = Reason.WEAK
+    reason[(reason == Reason.OK) & (_ink_slope(white - black, noise) > settings.ink_slope_max)] = Reason.EDGE
+    reason[shadow] = Reason.SHADOW
+    missing = reason != Reason.OK
+    return Correspondence(np.where(missing, np.nan, column), np.where(missing, np.nan, row), reason)
+
+
+def _ink_slope(lit: Floats, noise: Floats) -> Floats:
+    """Relative slope of white minus black, (height, width) [1/px], smoothed by about a lens's blur."""
+    smooth = np.maximum(ndimage.gaussian_filter(lit, 1.0), noise)
+    return np.asarray(ndimage.gaussian_gradient_magnitude(lit, 1.0) / smooth)
+
+
+def _differences(frames: Frames, both: Floats) -> tuple[Floats, Floats]:
+    """Pattern minus inverse of each bit, (bits, height, width), and each pixel's noise in one frame [grey levels].
+
+    Light adds up: pattern + inverse - (white + black) is noise alone, of four frames.
+    """
+    planes = iter(frames)
+    differences, noise = [], []
+    for pattern, inverse in zip(planes, planes, strict=True):
+        light, dark = luminance(pattern), luminance(inverse)
+        differences.append((light - dark).astype(np.float32))
+        noise.append(_noise_by_level(light + dark - both, both))
+    variance = np.median(noise, axis=0) / 4
+    levels = np.linspace(0.0, 1.0, len(variance)) * float(both.max())
+    return np.stack(differences), np.sqrt(np.maximum(np.interp(both, levels, variance), _ROUNDING**2))
+
+
+def _noise_by_level(residual: Floats, both: Floats, n_bins: int = 8) -> Floats:
+    """Robust variance of the residual at even grey levels, (n_bins,): read noise plus shot noise, a straight line."""
+    edges = np.unique(np.quantile(both, np.linspace(0.0, 1.0, n_bins + 1)))
+    members = np.clip(np.searchsorted(edges, both, side="right") - 1, 0, max(len(edges) - 2, 0))
+    levels, variances = [], []
+    for i in range(max(len(edges) - 1, 1)):
+        chosen = members == i
+        levels.append(float(both[chosen].mean()))
+        variances.append((1.4826 * float(np.median(np.abs(residual[chosen])))) ** 2)
+    line = np.polynomial.Polynomial.fit(levels, variances, 1 if len(levels) > 2 else 0)
+    return np.asarray(line(np.linspace(0.0, 1.0, n_bins) * float(both.max())))
+
+
+def _decode_axis(differences: Floats, shadow: Array, noise: Floats, extent: int, settings: GrayCodeSettings) -> Floats:
+    """Decode one sweep along the images' last axis; coordinates (height, width), NaN where they cannot be trusted.
+
+    A projector that is out of focus washes out its finest bits first: what they leave undecided is decoded without
+    them, from the borders of the coarser bits alone.
+    """
+    differences = np.ascontiguousarray(differences)
+    faint = np.abs(differences) < settings.bit_snr * np.sqrt(2) * noise
+    coordinate = np.full(shadow.shape, np.nan)
+    for n_dropped in range(1 + (settings.n_dropped_max if settings.subpixel else 0)):
+        n_bits = len(differences) - n_dropped
+        index = _gray_to_index(differences[:n_bits] > 0)
+        beyond = (index << n_dropped) >= extent
+        # At a border exactly one bit is grey by nature; two grey bits cannot be trusted.
+        weak = (faint[:n_bits].sum(axis=0) > 1) | beyond | shadow
+        if not settings.subpixel:
+            return np.where(weak, np.nan, index.astype(np.float64))
+        coarse = _between_borders(differences[:n_bits], index, weak, settings.gap_max_px)
+        coordinate = np.where(np.isfinite(coordinate), coordinate, (coarse + 0.5) * 2**n_dropped - 0.5)
+    return coordinate
+
+
+def _gray_to_index(bits: Array) -> Array:
+    """Gray code (bits, height, width), most significant first, to integers."""
+    binary = np.logical_xor.accumulate(bits, axis=0)
+    weights = 1 << np.arange(len(bits) - 1, -1, -1)
+    return np.tensordot(weights, binary, axes=1).astype(np.int32)
+
+
+@njit(cache=True)
+def _between_borders(differences: Floats, index: Array, weak: Array, gap_max: int) -> Floats:
+    """Interpolate along each image row between the borders of projector pixels.
+
+    Where neighbouring pixels see indices i and i +- 1, one bit flips; the zero crossing of its difference is the border
+    at i +- 1/2. Between two borders that enclose the same projector pixel or adjoin, the coordinate is linear.
+    """
+    n_bits, height, width = differences.shape
+    coordinate = np.full((height, width), np.nan)
+    for y in range(height):
+        last_x, last_border = -1.0, 0.0
+        for x in range(width - 1):
+            if weak[y, x] or weak[y, x + 1]:
+                last_x = -1.0
+                continue
+            step = index[y, x + 1] - index[y, x]
+            if step == 0:
+                continue
+            if abs(step) > 1:
+                last_x = -1.0
+                continue
+            flipped = 0
+            for b in range(n_bits):
+                if (differences[b, y, x] > 0) != (differences[b, y, x + 1] > 0):
+                    flipped = b
+            left, right = differences[flipped, y, x], differences[flipped, y, x + 1]
+            border_x = x + left / (left - right)
+            border = index[y, x] + 0.5 * step
+            if last_x >= 0 and 0 < border_x - last_x <= gap_max:
+                slope = (border - last_border) / (border_x - last_x)
+                for between in range(int(np.ceil(last_x)), int(np.floor(border_x)) + 1):
+                    coordinate[y, between] = last_border + slope * (between - last_x)
+            last_x, last_border = border_x, border
+    return coordinate

@@ -1,0 +1,68 @@
+"""Line-sweep decoding: the projector coordinate that each camera pixel saw (section 2.3).
+
+Two readings of the same frames, `temporal` and `spatial`, behind one function. Both stream: a sweep is never held.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from deskew.acquisition.sweep import Scene, Sweep, SweepSettings, grey_frames, still_scene
+from deskew.acquisition.sweep_spatial import decode_spatial
+from deskew.acquisition.sweep_temporal import decode_temporal
+from deskew.errors import StepError, require
+from deskew.types import Capture, Correspondence, Frames, PatternKind, Reason
+
+__all__ = ["SweepSettings", "decode_sweep"]
+
+
+def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) -> Sweep:
+    n_frames = len(frames)
+    require(n_frames >= settings.window, name, f"hold at least {settings.window} frames, one window", n_frames)
+    grey = grey_frames(frames, scene, name)
+    if settings.mode == "temporal":
+        return decode_temporal(grey, n_frames, scene, settings)
+    return decode_spatial(grey, n_frames, scene, settings, along_rows=name == "columns")
+
+
+def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Correspondence:
+    """Decode both sweeps of a capture.
+
+    Parameters
+    ----------
+    capture : Capture
+        A `LINE_SWEEP` capture; `columns` and then `rows` are each iterated once, in order.
+    settings : SweepSettings, optional
+        How to read it; by default temporal Gaussian peaks.
+
+    Returns
+    -------
+    Correspondence
+        Projector column and row of each raw camera pixel [px], float32, and the reason where there is none: that of
+        the columns if they failed, else that of the rows.
+
+    Raises
+    ------
+    InputError
+        The capture is no line sweep, or a frame differs from `white` in shape or type.
+    StepError
+        No pixel saw a stripe.
+    """
+    settings = settings or SweepSettings()
+    kind = capture.pattern
+    require(kind is PatternKind.LINE_SWEEP, "pattern", f"be {PatternKind.LINE_SWEEP} for decode_sweep", kind)
+    scene = still_scene(capture, settings)
+    columns = _decode(capture.columns, "columns", scene, settings)
+    rows = _decode(capture.rows, "rows", scene, settings)
+    reason = np.where(columns.reason != Reason.OK, columns.reason, rows.reason).astype(np.uint8)
+    ok = reason == Reason.OK
+    if not ok.any():
+        names = {
+            Reason(value).name: int(count) for value, count in zip(*np.unique(reason, return_counts=True), strict=True)
+        }
+        raise StepError(
+            f"decode_sweep found no stripe in any pixel ({names}): check that white, black and the frames show the "
+            "same still scene, and that frame i lights projector line i."
+        )
+    missing = np.float32(np.nan)
+    return Correspondence(np.where(ok, columns.position, missing), np.where(ok, rows.position, missing), reason)

@@ -1,0 +1,249 @@
+"""What both readings of a line sweep share: settings, the still scene, its noise, and frames read one at a time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from deskew.acquisition.peaks import fit_profiles
+from deskew.errors import require
+from deskew.types import Array, Capture, Floats, Frames, Reason
+
+RIVAL_SNR = 5.5  # of the highest noise among a thousand samples with a margin: a second peak must stand above it
+_MEASURES_WIDTH = 15.0  # signal-to-noise ratio from which a peak measures its own width to better than a tenth
+_ROUNDING = 1.0 / math.sqrt(12.0)  # no camera is quieter than the rounding of its grey levels
+
+
+@dataclass(frozen=True, slots=True)
+class SweepSettings:
+    """How a line sweep is read and what is believed of it.
+
+    Attributes
+    ----------
+    mode : "temporal" or "spatial"
+        Temporal: each camera pixel's brightness over the frames peaks at its projector coordinate. Spatial, the paper's
+        reading: each frame holds one curve, whose peak is found along every image row (columns) or column (rows).
+    peak : "gauss" or "integer"
+        Least-squares Gaussian, or the brightest sample itself.
+    half_width : int
+        Samples on either side of the brightest one that the fit sees, in [2, 15]; 3 serves stripes of a standard
+        deviation up to 1.6 samples.
+    min_snr : float
+        Smallest signal-to-noise ratio of a peak as a matched filter sees it, ``A sqrt(s sqrt(pi)) / noise``; the peak's
+        position is then known to ``sqrt(2) s / snr``.
+    shadow_snr : float
+        Smallest white - black of a lit pixel, in standard deviations of the dark noise.
+    second_peak_ratio : float
+        Smallest second peak, relative to the best, that makes a pixel ambiguous, in (0, 1].
+    width_ratio : float
+        A peak this many times wider or narrower than the scene's median is no single stripe, > 1.
+    saturated_level : int or None
+        Grey level at which the camera clips; None for the largest value of the images' type.
+    max_gap_px : float
+        Spatial mode: the widest gap between two observations that is interpolated [camera px].
+    """
+
+    mode: str = "temporal"
+    peak: str = "gauss"
+    half_width: int = 3
+    min_snr: float = 4.0
+    shadow_snr: float = 5.0
+    second_peak_ratio: float = 0.5
+    width_ratio: float = 2.0
+    saturated_level: int | None = None
+    max_gap_px: float = 3.0
+
+    def __post_init__(self) -> None:
+        require(self.mode in ("temporal", "spatial"), "mode", "be 'temporal' or 'spatial'", repr(self.mode))
+        require(self.peak in ("gauss", "integer"), "peak", "be 'gauss' or 'integer'", repr(self.peak))
+        require(2 <= self.half_width <= 15, "half_width", "be in [2, 15] samples", self.half_width)
+        require(self.min_snr > 0, "min_snr", "be positive", self.min_snr)
+        require(self.shadow_snr > 0, "shadow_snr", "be positive", self.shadow_snr)
+        require(0 < self.second_peak_ratio <= 1, "second_peak_ratio", "be in (0, 1]", self.second_peak_ratio)
+        require(self.width_ratio > 1, "width_ratio", "be above 1", self.width_ratio)
+        require(
+            self.saturated_level is None or self.saturated_level > 0,
+            "saturated_level",
+            "be positive or None",
+            self.saturated_level,
+        )
+        require(self.max_gap_px > 0, "max_gap_px", "be positive [camera px]", self.max_gap_px)
+
+    @property
+    def window(self) -> int:
+        """Samples of one profile."""
+        return 2 * self.half_width + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The still scene in grey levels.
+
+    Attributes
+    ----------
+    white, black : (height, width) arrays
+        Under the lit and the dark projector, both of the frames' type.
+    saturated_level : int
+        Grey level at which the camera clips.
+    """
+
+    white: Array
+    black: Array
+    saturated_level: int
+
+    @property
+    def contrast(self) -> Floats:
+        """White - black, (height, width) float32 [grey levels]."""
+        return np.asarray(self.white.astype(np.float32) - self.black.astype(np.float32))
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """One sweep, decoded.
+
+    Attributes
+    ----------
+    position : (height, width) float32 array
+        Projector coordinate [px]; meaningless where `reason` is not 0.
+    reason : (height, width) uint8 array
+        `Reason` of each pixel.
+    """
+
+    position: Floats
+    reason: npt.NDArray[np.uint8]
+
+
+def luminance(image: Array, name: str) -> Array:
+    """Grey levels of a grey or colour image, in its own integer type.
+
+    Green counts twice, red and blue once: close to luminance, and the same for RGB and BGR files. A pixel that clips in
+    any channel clips here, or an average would hide it.
+    """
+    require(image.dtype in (np.uint8, np.uint16), name, "be of type uint8 or uint16", image.dtype)
+    if image.ndim == 2:
+        return np.ascontiguousarray(image)
+    require(image.ndim == 3 and image.shape[2] == 3, name, "be (height, width[, 3])", image.shape)
+    first, green, last = (image[..., i].astype(np.uint32) for i in range(3))
+    grey = ((first + 2 * green + last + 2) // 4).astype(image.dtype)
+    top = np.iinfo(image.dtype).max
+    grey[(image == top).any(axis=2)] = top
+    return grey
+
+
+def still_scene(capture: Capture, settings: SweepSettings) -> Scene:
+    """Return white and black as grey levels, with the level at which the camera clips."""
+    white, black = luminance(capture.white, "white"), luminance(capture.black, "black")
+    require(black.dtype == white.dtype, "black", f"have white's type {white.dtype}", black.dtype)
+    return Scene(white, black, settings.saturated_level or int(np.iinfo(white.dtype).max))
+
+
+def grey_frames(frames: Frames, scene: Scene, name: str) -> Iterator[Array]:
+    """Yield each frame once, in order, checked against the still scene and as grey levels."""
+    count = 0
+    for i, frame in enumerate(frames):
+        grey = luminance(frame, f"{name}[{i}]")
+        require(grey.shape == scene.white.shape, f"{name}[{i}]", f"have white's shape {scene.white.shape}", grey.shape)
+        require(grey.dtype == scene.white.dtype, f"{name}[{i}]", f"have white's type {scene.white.dtype}", grey.dtype)
+        count += 1
+        yield grey
+    require(count == len(frames), name, f"yield its {len(frames)} frames", count)
+
+
+def dark_noise(frames: Array, scene: Scene) -> float:
+    """Estimate the standard deviation of a pixel that the stripe does not light [grey levels].
+
+    Parameters
+    ----------
+    frames : (n, height, width) array
+        The first few frames: a stripe lights only few of their pixels, and the median does not see those.
+    scene : Scene
+        Only its brighter half counts: a black level that clips at 0 would hide the noise.
+    """
+    n = len(frames)
+    contrast = scene.contrast
+    lit = contrast >= np.median(contrast)
+    variance = float(np.median(frames[:, lit].astype(np.float32).var(axis=0, ddof=1)))
+    # The median of chi-squared with n - 1 degrees of freedom, over its mean (Wilson and Hilferty).
+    unbiased = variance / (1.0 - 2.0 / (9.0 * (n - 1))) ** 3
+    return max(math.sqrt(unbiased), _ROUNDING)
+
+
+def dark_level(frames: Array, scene: Scene, noise: float) -> Floats:
+    """Level of each pixel without the stripe, (height, width) float32 [grey levels].
+
+    The black frame averaged with the first few of the sweep, (n, height, width): alone, its noise would lift or sink a
+    whole profile. Where a stripe passes in these frames, the black frame alone.
+    """
+    passed = frames.max(axis=0).astype(np.float32) - frames.min(axis=0) > 6.0 * noise
+    mean = (frames.sum(axis=0, dtype=np.float32) + scene.black) / np.float32(len(frames) + 1)
+    return np.where(passed, scene.black, mean).astype(np.float32)
+
+
+def shadowed(scene: Scene, noise: float, settings: SweepSettings) -> npt.NDArray[np.bool_]:
+    """Pixels that the projector does not reach, (height, width)."""
+    return np.asarray(scene.contrast < settings.shadow_snr * noise)
+
+
+@dataclass(frozen=True, slots=True)
+class Peaks:
+    """Fitted peaks, flat.
+
+    Attributes
+    ----------
+    position, amplitude, width : (n,) float32 arrays
+        [samples], [grey levels] and [samples].
+    reason : (n,) uint8 array
+        WEAK when lost in noise or narrower than a stripe, TWO_PEAKS when too wide for one; else OK.
+    """
+
+    position: Floats
+    amplitude: Floats
+    width: Floats
+    reason: npt.NDArray[np.uint8]
+
+
+def measure(
+    profiles: Array, level: Floats, index: Array, n_samples: int, noise: float, settings: SweepSettings
+) -> Peaks:
+    """Fit every profile, and judge it by its amplitude and width.
+
+    A strong peak's width is fitted with it; a weak one cannot measure its own, and takes the scene's.
+
+    Parameters
+    ----------
+    profiles, level, index, n_samples
+        As in :func:`deskew.acquisition.peaks.fit_profiles`; peaks of negative index are WEAK.
+    noise : float
+        Standard deviation of a sample [grey levels].
+    settings : SweepSettings
+        The thresholds.
+    """
+    position, amplitude, width = (np.zeros(len(index), np.float32) for _ in range(3))
+    fit_profiles(profiles, level, index, n_samples, 0.0, position, amplitude, width)
+    reason = np.full(len(index), Reason.WEAK, np.uint8)
+    # A high sample whose fit failed is no weak peak but no peak at all.
+    high_sample = profiles[:, settings.half_width] - level >= _MEASURES_WIDTH * noise
+    strong = high_sample | (matched_snr(amplitude, width, noise) >= _MEASURES_WIDTH)
+    if (strong & (amplitude > 0)).any():
+        # Of the higher peaks only: the lower ones' widths are noise.
+        high = strong & (amplitude > 0) & (amplitude >= 0.5 * np.percentile(amplitude[strong], 95))
+        typical = float(np.median(width[high]))
+        weak = np.where(strong, -1, index)
+        fit_profiles(profiles, level, weak, n_samples, typical, position, amplitude, width)
+        # A wrong level looks like a low and wide peak: width beyond a stripe's earns no credit.
+        reason[matched_snr(amplitude, np.minimum(width, typical), noise) >= settings.min_snr] = Reason.OK
+        reason[strong & (width > settings.width_ratio * typical)] = Reason.TWO_PEAKS
+        reason[strong & (width < typical / settings.width_ratio)] = Reason.WEAK
+    reason[index < 0] = Reason.WEAK
+    if settings.peak == "integer":
+        position = index.astype(np.float32)
+    return Peaks(position, amplitude, width, reason)
+
+
+def matched_snr(amplitude: Floats, width: Floats, noise: float) -> Floats:
+    """Signal-to-noise ratio of a Gaussian peak to a matched filter, ``A sqrt(s sqrt(pi)) / noise``."""
+    return np.asarray(amplitude * np.sqrt(width * math.sqrt(math.pi)) / noise)

@@ -1,0 +1,159 @@
+"""The paper's reading of a line sweep: each frame holds one curve, a peak along every image line (section 2.3).
+
+The curve gives, for a projector line, where it falls in the image; the projector coordinate at a pixel's centre is then
+interpolated between the neighbouring curves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+
+import numba
+import numpy as np
+
+from deskew.acquisition.sweep import RIVAL_SNR, Scene, Sweep, SweepSettings, dark_level, dark_noise, measure, shadowed
+from deskew.types import Array, Floats, Reason
+
+_SMOOTH_NOISE = 6.0**0.5 / 4.0  # of the mean weighted by (1, 2, 1), relative to a sample's
+_JUMP_LINES = 4  # missing curves leave smaller differences between neighbours
+_OK, _SATURATED, _WEAK, _TWO_PEAKS, _EDGE = (
+    int(r) for r in (Reason.OK, Reason.SATURATED, Reason.WEAK, Reason.TWO_PEAKS, Reason.EDGE)
+)
+
+
+@numba.njit(cache=True)
+def _brightest(line: Floats, start: int, stop: int) -> tuple[int, float]:
+    """Index and value of the highest entry of line[start:stop], (-1, 0) if none is positive."""
+    at, top = -1, np.float32(0.0)
+    for x in range(start, stop):
+        if line[x] > top:
+            at, top = x, line[x]
+    return at, float(top)
+
+
+@numba.njit(cache=True)
+def _curve(frame: Array, level: Floats, half: int, index: Array, profiles: Array, heights: Floats) -> None:
+    """Find one frame's stripe in each image line, where the line smoothed by (1, 2, 1) is highest.
+
+    Fills index (lines,), profiles (lines, 2 half + 1) above the level, and heights (lines, 2): of the best peak and of
+    the next away from it, smoothed to a sum of weights of 1.
+    """
+    n_lines, length = frame.shape
+    line = np.empty(length, np.float32)
+    smooth = np.zeros(length, np.float32)
+    for y in range(n_lines):
+        for x in range(length):
+            line[x] = frame[y, x] - level[y, x]
+        for x in range(1, length - 1):
+            smooth[x] = np.float32(0.25) * (line[x - 1] + line[x] + line[x] + line[x + 1])
+        at, heights[y, 0] = _brightest(smooth, 1, length - 1)
+        index[y] = at
+        if at < 0:
+            continue
+        for x in range(max(0, at - half), min(length, at + half + 1)):
+            profiles[y, x - at + half] = line[x]
+        left, right = _brightest(smooth, 1, at - half), _brightest(smooth, at + half + 1, length - 1)
+        heights[y, 1] = max(left[1], right[1])
+
+
+@numba.njit(cache=True)
+def _fill(
+    position: Floats, state: Array, n_frames: int, max_gap: float, integer: bool, out: Floats, reason: Array
+) -> None:
+    """Interpolate along each image line between curves that are neighbours there, in whatever order they come.
+
+    `position`, `state` are (frames, lines); a WEAK curve is absent, any other failure spoils the pixels it borders.
+    """
+    n_lines = len(out)
+    where = np.empty(n_frames)
+    which = np.empty(n_frames, np.int64)
+    for y in range(n_lines):
+        n = 0
+        for k in range(n_frames):
+            if state[k, y] != _WEAK:
+                where[n], which[n] = position[k, y], k
+                n += 1
+        order = np.argsort(where[:n])
+        where[:n], which[:n] = where[:n][order], which[:n][order]
+        for i in range(n - 1):
+            gap = where[i + 1] - where[i]
+            if gap > max_gap:
+                continue
+            verdict = max(state[which[i], y], state[which[i + 1], y])
+            # A jump here or next door: a depth edge, or curves of two surfaces that interleave.
+            for k in range(max(i - 1, 0), min(i + 2, n - 1)):
+                close = where[k + 1] - where[k] <= max_gap
+                if verdict == _OK and close and abs(which[k + 1] - which[k]) > _JUMP_LINES:
+                    verdict = _EDGE
+            for x in range(int(np.ceil(where[i])), int(np.floor(where[i + 1])) + 1):
+                reason[y, x] = verdict
+                t = (x - where[i]) / gap if gap > 0 else 0.5
+                if integer:
+                    t = np.round(t)
+                out[y, x] = which[i] + t * (which[i + 1] - which[i])
+
+
+def _observe(
+    frames: Iterator[Array], n_frames: int, scene: Scene, settings: SweepSettings, along_rows: bool
+) -> tuple[Floats, Array, float]:
+    """Find every curve; return positions and states, (frames, lines), and the dark noise."""
+    first = np.stack([next(frames) for _ in range(settings.window)])
+    noise = dark_noise(first, scene)
+    level = dark_level(first, scene, noise)
+    if not along_rows:
+        level = np.ascontiguousarray(level.T)
+    n_lines, length = level.shape
+    index = np.full((n_frames, n_lines), -1, np.int32)
+    profiles = np.zeros((n_frames, n_lines, settings.window), np.float32)
+    heights = np.zeros((n_frames, n_lines, 2), np.float32)
+    clipped = np.zeros((n_frames, n_lines), np.bool_)
+    for k, frame in enumerate(chain(first, frames)):
+        turned = frame if along_rows else np.ascontiguousarray(frame.T)
+        _curve(turned, level, settings.half_width, index[k], profiles[k], heights[k])
+        clipped[k] = turned[np.arange(n_lines), index[k]] >= scene.saturated_level
+    peaks = measure(
+        profiles.reshape(-1, settings.window), np.zeros(index.size, np.float32), index.ravel(), length, noise, settings
+    )
+    state = peaks.reason.reshape(index.shape)
+    best, second = heights[..., 0], heights[..., 1]
+    rival = np.maximum(settings.second_peak_ratio * best, RIVAL_SNR * _SMOOTH_NOISE * noise)
+    state[(state == Reason.OK) & (second > rival)] = Reason.TWO_PEAKS
+    state[clipped & (index >= 0)] = Reason.SATURATED
+    position = peaks.position.reshape(index.shape)
+    return np.where(clipped, index, position).astype(np.float32), state, noise
+
+
+def decode_spatial(
+    frames: Iterator[Array], n_frames: int, scene: Scene, settings: SweepSettings, *, along_rows: bool
+) -> Sweep:
+    """Decode one sweep curve by curve (section 2.3).
+
+    Parameters
+    ----------
+    frames : iterator of (height, width) arrays
+        Read once, in order.
+    n_frames : int
+        Length of the sweep.
+    scene : Scene
+        The still scene.
+    settings : SweepSettings
+        Window, thresholds and the widest gap to interpolate.
+    along_rows : bool
+        Search along image rows, for a sweep of projector columns; else along image columns.
+
+    Returns
+    -------
+    Sweep
+        Projector coordinate at each pixel's centre.
+    """
+    position, state, noise = _observe(frames, n_frames, scene, settings, along_rows)
+    shape = scene.black.shape
+    turned = shape if along_rows else shape[::-1]
+    out = np.full(turned, np.nan, np.float32)
+    reason = np.full(turned, int(Reason.WEAK), np.uint8)
+    _fill(position, state, n_frames, settings.max_gap_px, settings.peak == "integer", out, reason)
+    if not along_rows:
+        out, reason = np.ascontiguousarray(out.T), np.ascontiguousarray(reason.T)
+    reason[shadowed(scene, noise, settings)] = Reason.SHADOW
+    return Sweep(out, reason)

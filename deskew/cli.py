@@ -1,0 +1,290 @@
+"""The ``deskew`` command: capture folders in; calibrations, scans, figures and restored pages out.
+
+Figures go to stdout, one a line or, with --json, as one JSON object; progress and errors go to stderr. Exit codes:
+0 done, 2 a wrong input, 3 a step that failed on valid input. Nothing is written unless the command succeeds.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from deskew.errors import DeskewError, StepError, require
+
+# The stages are imported inside the commands: --help and wrong options answer at once, without numba and OpenCV.
+if TYPE_CHECKING:
+    from deskew.types import Array, Calibration, Capture, DepthMap, Frames, Restoration, Scan
+
+app = typer.Typer(
+    help="Restore an arbitrarily warped page from its 3D shape.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+CaptureFolder = Annotated[
+    Path, typer.Argument(metavar="CAPTURE", help="Capture folder (capture.toml, white.png, ...).")
+]
+CalibrationFile = Annotated[Path, typer.Option("--calibration", "-c", help="calibration.json of the same devices.")]
+Shape = Annotated[tuple[int, int], typer.Option("--shape", metavar="R C", help="Mesh vertices down and across.")]
+Method = Annotated[str, typer.Option("--method", "-m", help="Flattening method.")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+
+
+@dataclass(frozen=True, slots=True)
+class _Watched:
+    """Frames that show on a terminal how far they have been read; into a log or a pipe they write nothing."""
+
+    frames: Frames
+    label: str
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    def __iter__(self) -> Iterator[Array]:
+        from tqdm import tqdm
+
+        yield from tqdm(self.frames, self.label, unit="frame", file=sys.stderr, leave=False, disable=None)
+
+
+def _watched(capture: Capture, label: str) -> Capture:
+    columns = _Watched(capture.columns, f"{label} columns")
+    return replace(capture, columns=columns, rows=_Watched(capture.rows, f"{label} rows"))
+
+
+def _open(folder: Path) -> Capture:
+    from deskew import io
+
+    return _watched(io.read_capture(folder), folder.name)
+
+
+def _scan(folder: Path, calibration: Calibration, shape: tuple[int, int]) -> Scan:
+    require(min(shape) >= 2, "--shape", "be at least 2 vertices down and 2 across", f"{shape[0]} {shape[1]}")
+    capture = _open(folder)  # before the import below: a wrong folder is then refused within the blink of an eye
+    from deskew import pipeline
+
+    return pipeline.scan(capture, calibration, shape=shape)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(part) for part in value]
+    if hasattr(value, "item"):  # a number of numpy's
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value  # JSON has no NaN
+
+
+def _report(figures: Mapping[str, Any], as_json: bool) -> None:
+    plain = _plain(figures)
+    if as_json:
+        print(json.dumps(plain))
+        return
+    for key, value in plain.items():
+        print(f"{key}: {f'{value:.6g}' if isinstance(value, float) else value}")
+
+
+def _depth_figures(depth: DepthMap) -> dict[str, Any]:
+    from deskew.types import Reason
+
+    reason = depth.reason
+    missing = {kind.name.lower(): int((reason == kind).sum()) for kind in Reason if kind is not Reason.OK}
+    return {"depth_pixels": int((reason == 0).sum()), "missing_pixels": missing}
+
+
+def _restored_figures(restoration: Restoration) -> dict[str, Any]:
+    """Status and counters; a page that did not come to rest flat is still shown, and said so on stderr."""
+    from deskew.types import Status
+
+    flattened = restoration.flattened
+    if flattened is None:
+        return {}
+    if flattened.status is Status.DIVERGED:
+        raise StepError(f"Flattening diverged: {flattened.remedy}")
+    if flattened.status is not Status.AT_REST:
+        _say(f"warning: the page is {flattened.status}, not at rest and flat: {flattened.remedy}")
+    return {"status": str(flattened.status), **flattened.counters}
+
+
+@app.command()
+def calibrate(
+    board_folder: Annotated[Path, typer.Argument(metavar="BOARD_FOLDER", help="board.toml, pose_00/, pose_01/, ...")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="calibration.json to write.")],
+    as_json: Json = False,
+) -> None:
+    """Calibrate camera and projector from captures of a printed checkerboard.
+
+    Pose 00 lies on the bed and defines the world: Z = 0, X right and Y up in the camera's picture.
+
+    Example: deskew calibrate board/ -o calibration.json
+    """
+    from deskew import io, pipeline
+
+    io.require_writable(output, (".json",))
+    board, captures = io.read_board(board_folder)
+    watched = [_watched(capture, f"pose {i:02d}") for i, capture in enumerate(captures)]
+    calibration = pipeline.calibrate(board, watched)
+    io.write_calibration(calibration, output)
+    _report({"calibration": str(output), "n_poses": calibration.n_poses, **calibration.residuals}, as_json)
+
+
+@app.command()
+def scan(
+    capture: CaptureFolder,
+    calibration: CalibrationFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="scan.npz (everything) or scan.ply (the mesh).")],
+    shape: Shape = (45, 45),
+    as_json: Json = False,
+) -> None:
+    """Measure the page's 3D shape: depth map and mesh, in millimetres.
+
+    A PLY carries texture coordinates into the raw white image; `deskew restore` needs the NPZ.
+
+    Example: deskew scan page/ --calibration calibration.json -o scan.npz
+    """
+    from deskew import io, projection
+
+    io.require_writable(output, (".npz", ".ply"))
+    found = _scan(capture, io.read_calibration(calibration), shape)
+    if output.suffix.lower() == ".npz":
+        io.write_scan(found, output)
+    else:
+        size = found.camera.size
+        # Texture coordinates run from the picture's lower left corner, and a pixel's centre lies half a pixel inside.
+        texture = (projection.project(found.camera, found.sheet.vertices) + 0.5) / size
+        texture[..., 1] = 1.0 - texture[..., 1]
+        io.write_mesh(io.sheet_mesh(found.sheet, texture), output)
+    _report(
+        {"scan": str(output), "vertices": found.sheet.vertices[..., 0].size, **_depth_figures(found.depth)}, as_json
+    )
+
+
+@app.command()
+def accuracy(
+    captures: Annotated[list[Path], typer.Argument(metavar="CAPTURE...", help="Capture folders of a flat page.")],
+    calibration: CalibrationFile,
+    as_json: Json = False,
+) -> None:
+    """Measure the scanner's accuracy on planes: the deviation of their points from the best-fit plane (section 2.5).
+
+    Example: deskew accuracy plane_00/ plane_01/ --calibration calibration.json --json
+    """
+    from dataclasses import asdict
+
+    from deskew import acquisition, io
+
+    devices = io.read_calibration(calibration)
+    rows, deviations = [], []
+    for folder in captures:
+        depth, page = _flat_page(folder, devices)
+        deviations.append(acquisition.plane_deviation(acquisition.depth_points(depth, page)))
+        rows.append({"capture": str(folder), **asdict(deviations[-1]), **_depth_figures(depth)})
+    average = asdict(acquisition.average_deviation(deviations))
+    if as_json:
+        _report({"planes": rows, "average": average}, as_json)
+    for row in () if as_json else (*rows, {"capture": f"average of {len(rows)}", **average}):
+        _report(row, as_json)
+
+
+def _flat_page(folder: Path, devices: Calibration) -> tuple[DepthMap, Array]:
+    """Depth of a flat page's capture, and which pixels lie on the page: the desk around it is no part of the plane."""
+    import cv2
+    import numpy as np
+
+    from deskew import acquisition, pipeline
+
+    capture = _open(folder)
+    depth = acquisition.depth_map(devices, pipeline.decode(capture))
+    corners = acquisition.page_outline(capture.white, capture.black, devices.camera).corners
+    inside = np.zeros(depth.z.shape, np.uint8)
+    cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)  # a flat page's outline has four straight sides
+    return depth, inside.astype(bool)
+
+
+@app.command()
+def restore(
+    scan_file: Annotated[Path, typer.Argument(metavar="SCAN", help="scan.npz from `deskew scan`.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
+    method: Method = "paper_euler",
+    as_json: Json = False,
+) -> None:
+    """Flatten a scanned page and texture it: the restored image.
+
+    Example: deskew restore scan.npz -o restored.png
+    """
+    from deskew import io
+
+    io.require_writable(output, (".png", ".tif", ".tiff"))
+    _restore(io.read_scan(scan_file), method, output, as_json)
+
+
+@app.command()
+def run(
+    capture: CaptureFolder,
+    calibration: CalibrationFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
+    method: Method = "paper_euler",
+    shape: Shape = (45, 45),
+    as_json: Json = False,
+) -> None:
+    """Take a capture folder to a restored page: scan, flatten, texture.
+
+    Example: deskew run page/ --calibration calibration.json -o restored.png
+    """
+    from deskew import io
+
+    io.require_writable(output, (".png", ".tif", ".tiff"))
+    _restore(_scan(capture, io.read_calibration(calibration), shape), method, output, as_json)
+
+
+def _restore(found: Scan, method: str, output: Path, as_json: bool) -> None:
+    from deskew import io, pipeline
+
+    restoration = pipeline.restore(found, method=method)
+    figures = {"restored": str(output), "method": method, **_restored_figures(restoration)}
+    io.write_image(restoration.image, output)
+    _report(figures, as_json)
+
+
+def _say(message: str) -> None:
+    """Write one line to stderr, whatever line breaks or escape codes a file's name or content brought along."""
+    line = " ".join(message.split())
+    print("deskew: " + "".join(c if c.isprintable() else "?" for c in line), file=sys.stderr)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments after the program's name; those of the process by default.
+
+    Returns
+    -------
+    int
+        0 done, 2 wrong input or usage, 3 a step failed, 130 interrupted.
+    """
+    try:
+        # Typer's own handling would print usage, a hint and the error: three lines and no house wording.
+        return int(app(args=None if argv is None else list(argv), prog_name="deskew", standalone_mode=False) or 0)
+    except typer.TyperException as error:
+        _say(f"{error.format_message()} (deskew --help shows what is allowed)")
+        return 2
+    except DeskewError as error:
+        _say(str(error))
+        return error.exit_code
+    except (OSError, MemoryError) as error:
+        _say(f"The system refused: {error or 'out of memory'}; free some room or name another place.")
+        return 3
+    except (KeyboardInterrupt, typer.Abort):
+        _say("interrupted; nothing was written.")
+        return 130

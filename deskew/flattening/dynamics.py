@@ -1,0 +1,221 @@
+"""The particle system run until the sheet lies at rest on the plane (section 3.4).
+
+The paper stops when "the internal energy is minimized after collision". Energy alone accepts failures: a sheet that is
+locked in a buckle can store less of it than the flat one. Rest here means all of: every particle within eps of the
+plane; spring energy changed by less than 1e-5 of itself in 200 steps; kinetic energy below 1e-3 of it; no quad folded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from deskew.errors import require
+from deskew.flattening.contact import Plane
+from deskew.flattening.forces import System, spring_energy, system
+from deskew.flattening.integrators import CONTACTS, EVALUATIONS, REJECTED, STEPS, Run, Scheme, advance, start
+from deskew.flattening.settings import ParticleSettings
+from deskew.flattening.springs import Springs, chord_springs
+from deskew.flattening.stability import largest_stable_step, stiffest_mode
+from deskew.types import Array, Flattened, Floats, Sheet, Status
+
+WINDOW = 200
+# A window in which the step was halved so often that it lasted less than this share of 200 full steps proves nothing.
+SHORTEST_WINDOW = 0.1
+ENERGY_CHANGE = 1e-5
+KINETIC_SHARE = 1e-3
+# Springs of an exact isometry end with no energy at all; below this strain there is nothing left to settle.
+NEGLIGIBLE_STRAIN = 1e-6
+# A strain of 1 in the mean over all springs is no sheet any more.
+RUNAWAY_STRAIN = 1.0
+DT_SAFETY = 0.9
+# The step is never halved further than this share of the full one; literal halving goes on until it is absurd.
+DT_FLOOR = {"working": 2.0**-10, "literal": 1e-12}
+
+_DAMPING_RATIO = 0.8
+_PUSH = 0.5
+_DRAG = 3.0
+_SINKING = 0.5
+
+_REMEDY = {
+    Status.LOCKED: "Particles hang {z:.2f} mm above the plane in a buckle that holds: raise `gravity`.",
+    Status.FOLDED: "{folded} quads are folded over: lower `drag`, change `gravity`, or use a finer mesh or a static "
+    "method.",
+    Status.DIVERGED: "The springs tore apart: lower `dt`, or leave it out to have a stable one chosen.",
+}
+_COLLAPSED = "Literal step halving took dt down to {dt:.1e} s after {steps} steps: use `halving` = working."
+_UNSETTLED = "Still moving after {steps} steps: raise `max_steps`."
+
+
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """What a run was made with, after the settings left to choose have been chosen.
+
+    Attributes
+    ----------
+    physics : System
+        Springs, damping, gravity and drag.
+    weak_gravity : float
+        Downward acceleration once the whole sheet lies within eps of the plane [mm/s^2].
+    plane : Plane
+        Contact with the bed.
+    dt, dt_floor : float
+        Full step and the least it may be halved to [s].
+    """
+
+    physics: System
+    weak_gravity: float
+    plane: Plane
+    dt: float
+    dt_floor: float
+
+
+def folded_quads(xy: Floats) -> int:
+    """Count the quads of an (R, C, 2) grid that are turned over or not convex, against the way most of it lies."""
+    along, down = np.diff(xy, axis=1), np.diff(xy, axis=0)
+    corners = np.stack(
+        [
+            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+            for a in (along[:-1], along[1:])
+            for b in (down[:, :-1], down[:, 1:])
+        ]
+    )
+    return int((corners * np.sign(corners.sum()) <= 0).any(axis=0).sum())
+
+
+def choose_constants(springs: Springs, x: Array, scheme: Scheme, settings: ParticleSettings) -> Constants:
+    """Fill in the settings that were left to choose.
+
+    Parameters
+    ----------
+    springs : Springs
+        With their rest lengths.
+    x : (3, V) array
+        The sheet at rest [mm].
+    scheme : Scheme
+        The integrator, whose stability sets the step.
+    settings : ParticleSettings
+        None where to choose.
+
+    Raises
+    ------
+    InputError
+        If no step is stable for the integrator at this damping.
+    """
+    k, mass = springs.k_max, settings.mass
+    drag = _DRAG * np.sqrt(k * mass) / max(springs.grid) if settings.drag is None else settings.drag
+    gravity = _PUSH * k * springs.rest_mean / mass if settings.gravity is None else settings.gravity
+    physics = system(springs, beta=0.0, mass=mass, gravity=gravity, drag=drag)
+    lam_max = stiffest_mode(x, physics)
+    beta = 2 * _DAMPING_RATIO / np.sqrt(lam_max) if settings.k_d is None else settings.k_d / k
+    limit = largest_stable_step(scheme, lam_max, beta, drag / mass)
+    dt = DT_SAFETY * limit if settings.dt is None else settings.dt
+    require(dt > 0, "k_d", "be positive, or `drag` be: this integrator is unstable at every step without", settings.k_d)
+    weak = min(gravity, _SINKING * settings.eps_mm / dt**2) if settings.weak_gravity is None else settings.weak_gravity
+    plane = Plane(float(settings.eps_mm), float(settings.k_r), settings.halving == "literal")
+    floor = dt * DT_FLOOR[settings.halving]
+    return Constants(physics._replace(beta=float(beta)), float(weak), plane, float(dt), float(floor))
+
+
+def settle(sheet: Sheet, scheme: Scheme, settings: ParticleSettings) -> Flattened:
+    """Let a sheet fall onto Z = 0 and relax there.
+
+    The sheet starts at rest, lowered or lifted so that its lowest vertex touches the plane.
+
+    Parameters
+    ----------
+    sheet : Sheet
+        A grid of vertices [mm], with or without a stiffness for each quad.
+    scheme : Scheme
+        The integrator.
+    settings : ParticleSettings
+        The paper's constants.
+
+    Returns
+    -------
+    Flattened
+        With counters `steps`, `steps_rejected`, `force_evaluations`, `contacts`, `folded_quads`, `spring_energy` [uJ],
+        `kinetic_energy` [uJ], `height_max_mm` (before z is set to 0 on `AT_REST`), `dt`, `dt_smallest` and `time` [s],
+        and the constants chosen: `k_d` [kg/s], `gravity`, `weak_gravity` [mm/s^2] and `drag`
+        [kg/s].
+    """
+    springs = chord_springs(sheet, settings.k_s)
+    vertices = sheet.vertices - [0.0, 0.0, sheet.vertices[..., 2].min()]
+    x = np.ascontiguousarray(vertices.reshape(-1, 3).T)
+    constants = choose_constants(springs, x, scheme, settings)
+    run = start(vertices, scheme, constants.dt)
+    # A runaway ends in infinities on its way to `DIVERGED`: that is an outcome, not a warning.
+    with np.errstate(all="ignore"):
+        status, remedy, collapsed = _run_to_rest(run, scheme, springs, constants, settings.max_steps)
+        counters = _counters(run, springs, constants)
+    counters["step_collapsed"] = float(collapsed)
+    if status is Status.AT_REST:
+        run.x[2] = 0.0
+        counters["spring_energy"] = float(spring_energy(run.x, constants.physics))
+    return Flattened(run.x.T.reshape(vertices.shape), status, remedy, counters)
+
+
+def _run_to_rest(
+    run: Run, scheme: Scheme, springs: Springs, constants: Constants, max_steps: int
+) -> tuple[Status, str, bool]:
+    """Advance window by window until an outcome is known; return it, its remedy, and whether the step collapsed."""
+    physics, plane, weak = (
+        constants.physics,
+        constants.plane,
+        constants.physics._replace(gravity=constants.weak_gravity),
+    )
+    scale = 0.5 * float((physics.k_s * physics.rest**2).sum())  # energy of every spring at a strain of 1
+    before = np.inf
+    while True:
+        began, left = run.clock[1], max_steps - run.counts[STEPS]
+        pushing = weak if run.x[2].max() < plane.eps else physics
+        if not advance(run, scheme, pushing, plane, constants.dt, constants.dt_floor, min(WINDOW, left)):
+            return Status.LOCKED, _COLLAPSED.format(dt=run.clock[0], steps=run.counts[STEPS]), True
+        energy = float(spring_energy(run.x, physics))
+        kinetic = 0.5 * physics.mass * float((run.v**2).sum())
+        if not energy < RUNAWAY_STRAIN**2 * scale:  # NaN included
+            return Status.DIVERGED, _REMEDY[Status.DIVERGED], False
+        reference = max(energy, NEGLIGIBLE_STRAIN**2 * scale)
+        # Two hundred tiny steps show no change either: the window must have lasted.
+        still = run.clock[1] - began >= SHORTEST_WINDOW * WINDOW * constants.dt
+        still = still and abs(energy - before) <= ENERGY_CHANGE * reference and kinetic <= KINETIC_SHARE * reference
+        before = energy
+        if still or run.counts[STEPS] >= max_steps:
+            return *_outcome(run, springs, plane, still), False
+
+
+def _outcome(run: Run, springs: Springs, plane: Plane, still: bool) -> tuple[Status, str]:
+    """Name what a sheet that moves no more, or ran out of steps, has come to."""
+    z = float(run.x[2].max())
+    folded = folded_quads(run.x[:2].T.reshape(*springs.grid, 2))
+    if folded and (still or z < plane.eps):
+        return Status.FOLDED, _REMEDY[Status.FOLDED].format(folded=folded)
+    if not still and plane.literal:
+        return Status.LOCKED, _COLLAPSED.format(dt=run.clock[0], steps=run.counts[STEPS])
+    if not still:
+        return Status.LOCKED, _UNSETTLED.format(steps=run.counts[STEPS])
+    if z >= plane.eps:
+        return Status.LOCKED, _REMEDY[Status.LOCKED].format(z=z)
+    return Status.AT_REST, ""
+
+
+def _counters(run: Run, springs: Springs, constants: Constants) -> dict[str, float]:
+    physics = constants.physics
+    return {
+        "steps": float(run.counts[STEPS]),
+        "steps_rejected": float(run.counts[REJECTED]),
+        "force_evaluations": float(run.counts[EVALUATIONS]),
+        "contacts": float(run.counts[CONTACTS]),
+        "folded_quads": float(folded_quads(run.x[:2].T.reshape(*springs.grid, 2))),
+        "spring_energy": float(spring_energy(run.x, physics)),
+        "kinetic_energy": 0.5 * physics.mass * float((run.v**2).sum()),
+        "height_max_mm": float(run.x[2].max()),
+        "dt": constants.dt,
+        "dt_smallest": float(run.clock[2]),
+        "time": float(run.clock[1]),
+        "k_d": physics.beta * springs.k_max,
+        "gravity": physics.gravity,
+        "weak_gravity": constants.weak_gravity,
+        "drag": physics.drag,
+    }

@@ -1,0 +1,172 @@
+"""The springs of a grid: structural along its edges, shear along each quad's diagonals (section 3.2.2, figure 2b).
+
+Springs are stored by the grid, not as a list: family `f`, row `r` and column `c` name the spring that joins vertex
+(r, c) + `TAILS[f]` to vertex (r, c) + `HEADS[f]`. The force pass then walks along rows without an index table, which
+is what lets a compiler use vector instructions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from deskew.errors import require
+from deskew.types import Array, Floats, Sheet
+
+# Provot's names: two families of structural springs and two of shear springs.
+FAMILIES = ("structural_row", "structural_column", "shear_down", "shear_up")
+TAILS = ((0, 0), (0, 0), (0, 0), (1, 0))
+HEADS = ((0, 1), (1, 0), (1, 1), (0, 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Springs:
+    """Rest length and stiffness of every spring of an (R, C) grid.
+
+    Attributes
+    ----------
+    rest : (4, R, C) array
+        Rest length r of eq. 1 [mm], by family; 0 where the grid ends and there is no spring.
+    k_s : (4, R, C) array
+        Spring constant [kg/s^2]; 0 where there is no spring.
+    """
+
+    rest: Floats
+    k_s: Floats
+
+    def __post_init__(self) -> None:
+        require(self.rest.ndim == 3 and len(self.rest) == 4, "rest", "have shape (4, R, C)", self.rest.shape)
+        require(self.k_s.shape == self.rest.shape, "k_s", f"have rest's shape {self.rest.shape}", self.k_s.shape)
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Rows and columns of the vertices."""
+        return self.rest.shape[1], self.rest.shape[2]
+
+    @property
+    def k_max(self) -> float:
+        """Stiffness of the stiffest spring [kg/s^2]: it alone sets the stable step."""
+        return float(self.k_s.max())
+
+    @property
+    def rest_mean(self) -> float:
+        """Mean rest length of the structural springs [mm]."""
+        structural = self.rest[:2]
+        return float(structural.sum() / np.count_nonzero(structural))
+
+    def pairs(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Floats, Floats]:
+        """List the springs for a program that knows no grid.
+
+        Returns
+        -------
+        a, b : (S,) int arrays
+            Vertices joined by each spring, as indices into the grid's ravelled vertices.
+        rest, k_s : (S,) arrays
+            Rest length [mm] and spring constant [kg/s^2] of each.
+        """
+        index = np.arange(self.rest[0].size).reshape(self.grid)
+        tails, heads, rests, constants = [], [], [], []
+        for family in range(len(FAMILIES)):
+            a, b = _ends(index, family)
+            tails.append(a.ravel())
+            heads.append(b.ravel())
+            rests.append(self.rest[family][: a.shape[0], : a.shape[1]].ravel())
+            constants.append(self.k_s[family][: a.shape[0], : a.shape[1]].ravel())
+        return np.concatenate(tails), np.concatenate(heads), np.concatenate(rests), np.concatenate(constants)
+
+
+def _ends(values: Array, family: int) -> tuple[Array, Array]:
+    """View a per-vertex array (R, C, ...) at the tails and at the heads of a family's springs."""
+    (i, j), (p, q) = TAILS[family], HEADS[family]
+    rows, columns = values.shape[0] - max(i, p), values.shape[1] - max(j, q)
+    return values[i : rows + i, j : columns + j], values[p : rows + p, q : columns + q]
+
+
+def chord_lengths(vertices: Floats) -> Floats:
+    """Length of every spring of a grid as the straight chord between its ends.
+
+    A chord is shorter than the paper it spans wherever the surface bends between two samples: this, not the
+    integration, is the largest error of the paper's method.
+
+    Parameters
+    ----------
+    vertices : (R, C, 3) array
+        Positions [mm].
+
+    Returns
+    -------
+    (4, R, C) array
+        Lengths [mm], by family, 0 where there is no spring.
+    """
+    lengths = np.zeros((4, *vertices.shape[:2]))
+    for family in range(len(FAMILIES)):
+        a, b = _ends(vertices, family)
+        d = b - a
+        # Written as the force pass writes it, so that an unmoved spring exerts exactly no force.
+        lengths[family, : d.shape[0], : d.shape[1]] = np.sqrt(
+            d[..., 0] * d[..., 0] + d[..., 1] * d[..., 1] + d[..., 2] * d[..., 2]
+        )
+    return lengths
+
+
+def spring_constants(grid: tuple[int, int], k_s: float, quads: Floats | None = None) -> Floats:
+    """Spread a spring constant, or one constant a quad, over the springs of a grid.
+
+    Parameters
+    ----------
+    grid : (R, C)
+        Rows and columns of the vertices.
+    k_s : float
+        Uniform constant [kg/s^2], used when `quads` is None.
+    quads : (R - 1, C - 1) array or None
+        Constant of each quad [kg/s^2]: its shear springs take it, a structural spring takes the mean of the quads
+        that it borders.
+
+    Returns
+    -------
+    (4, R, C) array
+        Constants by family [kg/s^2], 0 where there is no spring.
+    """
+    rows, columns = grid
+    constants = np.zeros((4, rows, columns))
+    if quads is None:
+        constants[0, :, : columns - 1] = k_s
+        constants[1, : rows - 1, :] = k_s
+        constants[2:, : rows - 1, : columns - 1] = k_s
+        return constants
+    padded = np.pad(quads, 1, mode="edge")
+    constants[0, :, : columns - 1] = (padded[:-1, 1:-1] + padded[1:, 1:-1]) / 2
+    constants[1, : rows - 1, :] = (padded[1:-1, :-1] + padded[1:-1, 1:]) / 2
+    constants[2:, : rows - 1, : columns - 1] = quads
+    return constants
+
+
+def chord_springs(sheet: Sheet, k_s: float) -> Springs:
+    """Attach the paper's springs to a sheet: at rest as it was scanned, each as long as its chord (section 3.4).
+
+    Parameters
+    ----------
+    sheet : Sheet
+        A grid; its `stiffness`, where given, replaces `k_s`.
+    k_s : float
+        Uniform spring constant [kg/s^2].
+
+    Returns
+    -------
+    Springs
+        With rest length = chord.
+
+    Raises
+    ------
+    InputError
+        If the sheet is not a grid, or two joined vertices coincide.
+    """
+    require(sheet.faces is None, "sheet", "be an (R, C, 3) grid for a particle system", "a triangle mesh")
+    rows, columns = sheet.vertices.shape[:2]
+    rest = chord_lengths(sheet.vertices)
+    constants = spring_constants((rows, columns), k_s, sheet.stiffness)
+    coincident = int(((rest == 0) & (constants > 0)).sum())
+    require(coincident == 0, "vertices", "be distinct along every edge and diagonal", f"{coincident} coincident pairs")
+    return Springs(rest, constants)

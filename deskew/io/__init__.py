@@ -1,0 +1,36 @@
+"""Reading and writing what the stages exchange: captures, boards, calibrations, scans, meshes, images.
+
+Every reader takes a path, checks what it finds and raises `deskew.errors.InputError` naming the file; every writer
+takes the thing, then the path, and leaves either the whole file or nothing. Colour images are RGB in memory.
+"""
+
+from deskew.io.boards import read_board, read_procam_graycode, write_board
+from deskew.io.calibrations import read_calibration, write_calibration
+from deskew.io.captures import read_capture, write_capture
+from deskew.io.files import require_writable
+from deskew.io.images import read_image, write_image
+from deskew.io.meshes import Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
+from deskew.io.scans import read_depth, read_depth_image, read_scan, write_depth, write_scan
+
+__all__ = [
+    "Mesh",
+    "grid_faces",
+    "read_board",
+    "read_calibration",
+    "read_capture",
+    "read_depth",
+    "read_depth_image",
+    "read_image",
+    "read_mesh",
+    "read_procam_graycode",
+    "read_scan",
+    "require_writable",
+    "sheet_mesh",
+    "write_board",
+    "write_calibration",
+    "write_capture",
+    "write_depth",
+    "write_image",
+    "write_mesh",
+    "write_scan",
+]

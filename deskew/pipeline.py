@@ -1,0 +1,115 @@
+"""A capture in, a restored page out: the one place that chains the stages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from deskew import acquisition, flattening, restoration
+from deskew.acquisition import DepthSettings, GrayCodeSettings, Outline, SweepSettings
+from deskew.types import (
+    Board,
+    Calibration,
+    Capture,
+    Correspondence,
+    PatternKind,
+    Restoration,
+    Scan,
+)
+
+WHITE = "white"
+
+
+def decode(
+    capture: Capture, *, sweep: SweepSettings | None = None, gray: GrayCodeSettings | None = None
+) -> Correspondence:
+    """Decode a capture, whichever pattern it holds (section 2.3).
+
+    Parameters
+    ----------
+    capture : Capture
+        Line sweep or Gray code.
+    sweep, gray : settings, optional
+        Of the decoder for either kind.
+    """
+    if capture.pattern is PatternKind.LINE_SWEEP:
+        return acquisition.decode_sweep(capture, sweep)
+    return acquisition.decode_gray(capture, gray)
+
+
+def calibrate(board: Board, captures: Iterable[Capture]) -> Calibration:
+    """Calibrate camera and projector from captures of a printed board (section 2.2).
+
+    Parameters
+    ----------
+    board : Board
+        The printed board.
+    captures : iterable of Capture
+        One a pose, read one at a time; the first lies on the bed and defines the world.
+
+    Raises
+    ------
+    StepError
+        If a board is not found, or the poses do not determine the devices.
+    """
+    views = [acquisition.view_board(board, capture, decode(capture)) for capture in captures]
+    return acquisition.calibrate(board, views)
+
+
+def scan(
+    capture: Capture,
+    calibration: Calibration,
+    *,
+    shape: tuple[int, int] = (45, 45),
+    outline: Outline | None = None,
+    mask: npt.NDArray[np.bool_] | None = None,
+    sweep: SweepSettings | None = None,
+    gray: GrayCodeSettings | None = None,
+    depth: DepthSettings | None = None,
+    max_hole_px: float = 12.0,
+) -> Scan:
+    """Scan a page: decode, cull, triangulate and span a mesh over its outline (sections 2.3 and 2.4).
+
+    Parameters
+    ----------
+    capture : Capture
+        The page.
+    calibration : Calibration
+        Of the same devices.
+    shape : (rows, columns)
+        Vertices of the mesh; the paper's is 45 x 45.
+    outline : Outline, optional
+        The page's sides; found on the desk in the white and black frames if not given.
+    mask : (height, width) bool array, optional
+        The page in raw pixels, instead of `outline`.
+    sweep, gray, depth : settings, optional
+        Of the stages.
+    max_hole_px : float
+        Holes in the depth map up to this distance from measured depth are filled for the mesh.
+    """
+    depth_map = acquisition.depth_map(calibration, decode(capture, sweep=sweep, gray=gray), depth)
+    if outline is None:
+        outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask)
+    mesh = acquisition.page_mesh(depth_map, outline, shape, max_hole_px=max_hole_px)
+    images = {WHITE: capture.white, **capture.textures}
+    return Scan(images, depth_map, calibration.camera, mesh.sheet, outline.corners)
+
+
+def restore(scan: Scan, *, method: str = "paper_euler", light: str = WHITE, **settings: object) -> Restoration:
+    """Flatten a scan and render the page as if it had never been bent (sections 3 and 3.5).
+
+    Parameters
+    ----------
+    scan : Scan
+        The page.
+    method : str
+        A flattening method's name, or "package.module:function".
+    light : str
+        Which of the scan's images to restore.
+    **settings
+        Of the flattening method.
+    """
+    flattened = flattening.flatten(scan.sheet, method=method, **settings)
+    return restoration.texture_quads(scan.images[light], scan.camera, scan.sheet, flattened)

@@ -1,0 +1,1 @@
+"""The paper's experiments as planned, resumable trials: plan, run, store, report."""

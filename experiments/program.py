@@ -1,0 +1,112 @@
+"""The Hydra program: compose, check, run; every error ends in one line and its exit code."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NoReturn
+
+import hydra
+from hydra._internal.utils import get_args_parser
+from hydra.core.config_store import ConfigStore
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+
+from deskew.errors import DeskewError, InputError
+from experiments.campaign import carry_out_campaign
+from experiments.complaints import one_line
+from experiments.settings import Config
+from experiments.studies import STUDIES, AbsentError
+
+_CONF = Path(__file__).resolve().parents[1] / "conf"
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run `python -m experiments ARGUMENTS`.
+
+    Returns
+    -------
+    int
+        0 if it ran, 2 for wrong input, 3 if a step failed, 130 if it was interrupted; the worst of a multirun.
+    """
+    codes = [0]
+    ConfigStore.instance().store("schema", Config)
+    # A sweep's folder cannot wait until `out` is resolved for each job.
+    OmegaConf.register_new_resolver("either", lambda first, second: first or second, replace=True)
+
+    def task(config: DictConfig) -> None:
+        codes.append(_run_job(config))
+
+    try:
+        with _hydra_raises(arguments):
+            hydra.main(config_path=str(_CONF), config_name="config", version_base="1.3")(task)()
+    except (HydraException, OmegaConfBaseException, DeskewError) as error:
+        print(one_line(error), file=sys.stderr)
+        return error.exit_code if isinstance(error, DeskewError) else InputError.exit_code
+    except KeyboardInterrupt:
+        print("Interrupted; finished trials are kept, and the same command goes on from there.", file=sys.stderr)
+        return 130
+    return max(codes)
+
+
+def _run_job(composed: DictConfig) -> int:
+    try:
+        config, out = _checked(composed)
+        finished = carry_out_campaign(config, out)
+    except AbsentError as absence:
+        print(f"{composed.experiment}: absent: {absence}")
+        return 0
+    except (OmegaConfBaseException, DeskewError) as error:
+        print(one_line(error), file=sys.stderr)
+        return error.exit_code if isinstance(error, DeskewError) else InputError.exit_code
+    failed = f", {finished.n_failed} failed (see {finished.out / 'run.json'})" if finished.n_failed else ""
+    print(f"{config.experiment}: {finished.n_planned} trials, {finished.n_run} run now{failed} -> {finished.out}")
+    return 0
+
+
+def _checked(composed: DictConfig) -> tuple[Config, Path]:
+    """Turn the composed configuration into checked objects and say where the run writes."""
+    job = HydraConfig.get()
+    for override in job.overrides.task:
+        if override.startswith(("+", "~")):
+            name = override.lstrip("+~").split("=")[0]
+            raise InputError(f"`{name}` must be an existing key that is given as {name}=VALUE, got {override}.")
+    if OmegaConf.is_missing(composed, "experiment"):
+        raise InputError(f"`experiment` must be one of {', '.join(sorted(STUDIES))}, got nothing.")
+    config = OmegaConf.to_object(composed)
+    assert isinstance(config, Config)
+    out = Path(config.out or f"out/{config.budget.name}/{config.experiment}")
+    if job.mode == RunMode.MULTIRUN:
+        out = Path(job.runtime.output_dir)
+    return config, out
+
+
+class _Parser(argparse.ArgumentParser):
+    """Hydra's parser, which would print its usage and exit."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"The arguments must be KEY=VALUE or Hydra's own options (see --hydra-help), got: {message}.")
+
+
+@contextmanager
+def _hydra_raises(arguments: Sequence[str]) -> Iterator[None]:
+    """Let Hydra read `arguments`, and raise its errors instead of printing them in many lines and exiting with 1."""
+    before, full_error = sys.argv, os.environ.get("HYDRA_FULL_ERROR")
+    sys.argv = ["experiments", *arguments]
+    os.environ["HYDRA_FULL_ERROR"] = "1"
+    try:
+        _Parser(parents=[get_args_parser()], add_help=False).parse_args(list(arguments))
+        yield
+    finally:
+        sys.argv = before
+        if full_error is None:
+            del os.environ["HYDRA_FULL_ERROR"]
+        else:
+            os.environ["HYDRA_FULL_ERROR"] = full_error

@@ -1,0 +1,9 @@
+"""Rows to files: results, tables, figures and what produced them.
+
+Only the layout is offered here, because each worker imports it with its study; what draws and writes is imported by
+the driver from its own module.
+"""
+
+from experiments.reporting.layout import Column, Layout, Plot
+
+__all__ = ["Column", "Layout", "Plot"]

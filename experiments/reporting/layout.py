@@ -1,0 +1,72 @@
+"""How a study's table and figures look, as data: each study declares it, nothing here knows any study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A metric in the table.
+
+    Attributes
+    ----------
+    metric : str
+        Column `metric` of `results.csv`.
+    heading : str
+        What the table calls it, with its unit.
+    digits : int
+        Decimals shown.
+    paper : mapping of condition to text
+        The paper's figure beside ours; a condition also stands for those that go on with "/".
+    """
+
+    metric: str
+    heading: str
+    digits: int = 3
+    paper: Mapping[str, str] = field(default_factory=dict)
+
+    def paper_figure(self, condition: str) -> str:
+        """Return the paper's figure for a condition, "" where it has none."""
+        return self.paper.get(condition, self.paper.get(condition.split("/")[0], ""))
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """A figure: one metric, a dot a trial, one row of dots for each condition and method.
+
+    Attributes
+    ----------
+    name : str
+        Written as `figures/NAME.png`.
+    metric, label : str
+        What is drawn and how its axis is called, with the unit.
+    paper : float or None
+        The paper's figure, drawn as a line; in the metric's unit.
+    """
+
+    name: str
+    metric: str
+    label: str
+    paper: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Table and figures of one study.
+
+    Attributes
+    ----------
+    title, note : str
+        Heading of `table.md` and the sentences under it.
+    columns : tuple of Column
+        The metrics, left to right; the table of single trials shows these in the paper's manner, a line a trial.
+    plots : tuple of Plot
+        The figures.
+    """
+
+    title: str
+    note: str
+    columns: tuple[Column, ...]
+    plots: tuple[Plot, ...] = ()

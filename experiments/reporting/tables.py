@@ -1,0 +1,89 @@
+"""Rows to `table.md`: each trial in the paper's manner, then all of them with their spread."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+
+from experiments.reporting.layout import Column, Layout
+from experiments.reporting.statistics import summarise
+from experiments.trials.schema import Failure, Row
+
+# Beyond this many a line a trial is no longer read; `results.csv` has them all.
+_MAX_TRIALS_SHOWN = 10
+_NONE = "–"
+
+Place = tuple[str, str]
+
+
+def markdown_table(headings: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table; the first column is text, the others are set flush right."""
+    rule = ["---"] + ["---:"] * (len(headings) - 1)
+    return "\n".join("| " + " | ".join(cells) + " |" for cells in (headings, rule, *lines))
+
+
+def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure]) -> str:
+    """Return the text of `table.md`.
+
+    Parameters
+    ----------
+    layout : Layout
+        The study's columns and the paper's figures.
+    rows : sequence of Row
+        All results.
+    failures : sequence of Failure
+        Each is listed with its reason.
+    """
+    parts = [f"# {layout.title}", layout.note]
+    if len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
+        parts += ["## Each trial", _each_trial(layout, rows)]
+    parts += ["## All trials", _all_trials(layout, rows)]
+    if failures:
+        lines = [[str(f.trial), str(f.seed), f.condition, f.method, f.reason.replace("|", "/")] for f in failures]
+        parts += ["## Failed", markdown_table(("trial", "seed", "condition", "method", "reason"), lines)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _each_trial(layout: Layout, rows: Sequence[Row]) -> str:
+    cells: dict[tuple[str, str, int, int], dict[str, float]] = defaultdict(dict)
+    for row in rows:
+        cells[row.condition, row.method, row.trial, row.seed][row.metric] = row.value
+    shown = [column for column in layout.columns if any(column.metric in found for found in cells.values())]
+    lines = [
+        [condition, method, str(trial), *(_cell(found, column) for column in shown)]
+        for (condition, method, trial, _), found in sorted(cells.items())
+        if "failed" in found or any(column.metric in found for column in shown)
+    ]
+    return markdown_table(("condition", "method", "trial", *(column.heading for column in shown)), lines)
+
+
+def _cell(found: dict[str, float], column: Column) -> str:
+    if column.metric in found:
+        return f"{found[column.metric]:.{column.digits}f}"
+    return "failed" if "failed" in found else _NONE
+
+
+def _all_trials(layout: Layout, rows: Sequence[Row]) -> str:
+    values: dict[Place, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for row in rows:
+        values[row.condition, row.method][row.metric].append(row.value)
+    lines = []
+    for (condition, method), metrics in sorted(values.items()):
+        n_failed = len(metrics.get("failed", ()))
+        named = [column for column in layout.columns if column.metric in metrics]
+        lines += [
+            [condition, method, *_summary(column, metrics[column.metric], n_failed, condition)] for column in named
+        ]
+        if n_failed and not named:
+            lines.append([condition, method, _NONE, "0", str(n_failed), *[_NONE] * 6])
+    headings = ("condition", "method", "metric", "n", "failed", "mean", "95 % of mean", "median", "min", "max", "paper")
+    return markdown_table(headings, lines)
+
+
+def _summary(column: Column, values: Sequence[float], n_failed: int, condition: str) -> list[str]:
+    found = summarise(values)
+    digits = column.digits
+    interval = _NONE if found.interval is None else f"{found.interval[0]:.{digits}f}..{found.interval[1]:.{digits}f}"
+    spread = (f"{value:.{digits}f}" for value in (found.median, found.minimum, found.maximum))
+    paper = column.paper_figure(condition) or _NONE
+    return [column.heading, str(found.n), str(n_failed), f"{found.mean:.{digits}f}", interval, *spread, paper]

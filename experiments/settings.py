@@ -1,0 +1,199 @@
+"""Every configuration key, its type, its allowed range and its default; `conf/` only chooses among them.
+
+Hydra checks names and types against these classes. Ranges are checked when the composed configuration becomes objects,
+in `__post_init__`; each setting carries its range as text, so that a wrong type and a wrong value read alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, is_dataclass
+from math import isfinite
+from typing import Any, ClassVar
+
+from omegaconf import MISSING
+
+from deskew.errors import InputError, require
+
+BUDGETS = ("smoke", "paper", "full")
+
+
+def setting(default: Any, allowed: str, holds: Callable[[Any], bool]) -> Any:
+    """Declare a key with its range.
+
+    Parameters
+    ----------
+    default : scalar, list or None
+        Value unless the configuration gives one; a list is copied for each instance.
+    allowed : str
+        The range, continuing "`key` must ...", with its unit.
+    holds : callable
+        Whether a value lies in the range.
+    """
+    metadata = {"allowed": allowed, "holds": holds}
+    if isinstance(default, list):
+        return field(default_factory=lambda: list(default), metadata=metadata)
+    return field(default=default, metadata=metadata)
+
+
+def number(default: float, low: float, high: float, unit: str = "") -> Any:
+    """Declare a float in [low, high]."""
+    text = f"lie in [{low:g}, {high:g}]{unit and ' ' + unit}"
+    return setting(default, text, lambda value: isfinite(value) and low <= value <= high)
+
+
+def count(default: int, low: int, high: int) -> Any:
+    """Declare a whole number in [low, high]."""
+    return setting(default, f"be a whole number in [{low}, {high}]", lambda value: low <= value <= high)
+
+
+def choice(default: str, *allowed: str) -> Any:
+    """Declare one of a few names."""
+    return setting(default, f"be one of {', '.join(allowed)}", lambda value: value in allowed)
+
+
+@dataclass
+class Checked:
+    """A group of settings that checks its own ranges."""
+
+    group: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            if "holds" in item.metadata:
+                value = getattr(self, item.name)
+                require(item.metadata["holds"](value), self.group + item.name, item.metadata["allowed"], repr(value))
+
+
+@dataclass
+class BudgetSettings(Checked):
+    """How much work a run may take: `smoke` proves that it runs, `paper` is the paper's scale, `full` is for claims."""
+
+    group: ClassVar[str] = "budget."
+    name: str = choice("paper", *BUDGETS)
+
+
+@dataclass
+class TrialsAt(Checked):
+    """Trials of an experiment at each budget; an explicit `trials` overrides them."""
+
+    group: ClassVar[str] = "trials_at."
+    smoke: int = count(1, 1, 100_000)
+    paper: int = count(5, 1, 100_000)
+    full: int = count(50, 1, 100_000)
+
+
+@dataclass
+class SheetSettings(Checked):
+    """The crumpled sheet."""
+
+    group: ClassVar[str] = "sheet."
+    kind: str = choice("mirror", "mirror")
+    slope_p90_deg: float = number(20.0, 1.0, 60.0, "degrees")
+    paths: list[str] = setting(
+        [], "be a list of NPZ files, one a trial", lambda value: all(str(path).endswith(".npz") for path in value)
+    )
+
+
+@dataclass
+class PageSettings(Checked):
+    """What is printed on the sheet."""
+
+    group: ClassVar[str] = "page."
+    kind: str = choice("checkerboard", "checkerboard")
+
+
+@dataclass
+class RigSettings(Checked):
+    """The synthetic rig."""
+
+    group: ClassVar[str] = "rig."
+    noise_scale: float = number(1.0, 0.0, 10.0, "times the rig's own noise")
+    board_poses: int = count(9, 3, 12)
+
+
+@dataclass
+class EngineSettings(Checked):
+    """What carries the trials out."""
+
+    group: ClassVar[str] = "engine."
+    name: str = choice("processes", "serial", "processes")
+    workers: int | None = setting(
+        None,
+        "be a whole number in [1, 256], or null for one a core",
+        lambda value: value is None or 1 <= value <= 256,
+    )
+
+
+@dataclass
+class MeshSettings(Checked):
+    """The paper's finite element mesh of 45 x 45 samples (section 4.1)."""
+
+    group: ClassVar[str] = "mesh."
+    rows: int = count(45, 2, 1000)
+    columns: int = count(45, 2, 1000)
+
+
+@dataclass
+class RealBoardsSettings(Checked):
+    """The real captures; they are not part of the project."""
+
+    group: ClassVar[str] = "real_boards."
+    path: str | None = None
+
+
+@dataclass
+class Config(Checked):
+    """The whole configuration of one run."""
+
+    experiment: str = MISSING
+    seed: int = count(1, 0, 2**32 - 1)
+    trials: int = setting(MISSING, "be a whole number in [1, 100000]", lambda value: 1 <= value <= 100_000)
+    trials_at: TrialsAt = field(default_factory=TrialsAt)
+    # One name or a list of names: Hydra has no type for that, so it is checked and made a list here.
+    method: Any = setting(["paper_euler", "paper_rk4"], "be a method's name or a list of different names", bool)
+    out: str | None = None
+    budget: BudgetSettings = field(default_factory=BudgetSettings)
+    engine: EngineSettings = field(default_factory=EngineSettings)
+    sheet: SheetSettings = field(default_factory=SheetSettings)
+    page: PageSettings = field(default_factory=PageSettings)
+    rig: RigSettings = field(default_factory=RigSettings)
+    mesh: MeshSettings = field(default_factory=MeshSettings)
+    real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
+
+    def __post_init__(self) -> None:
+        Checked.__post_init__(self)
+        names = [self.method] if isinstance(self.method, str) else self.method
+        listed = isinstance(names, list) and all(isinstance(name, str) and name for name in names)
+        if not listed or len(set(names)) != len(names):
+            raise InputError(f"`method` must be a method's name or a list of different names, got {self.method!r}.")
+        self.method = list(names)
+
+    @property
+    def methods(self) -> list[str]:
+        """The methods under test, in the order asked for."""
+        return list(self.method)
+
+
+def allowed_text(key: str) -> str | None:
+    """Return the range of a dotted key as text, or None where the key has none or does not exist."""
+    node: Any = Config
+    *groups, last = key.split(".")
+    for name in groups:
+        item = {item.name: item for item in fields(node)}.get(name)
+        node = item.default_factory if item is not None else None
+        if not (isinstance(node, type) and is_dataclass(node)):
+            return None
+    item = {item.name: item for item in fields(node)}.get(last.split("[")[0])
+    return None if item is None else item.metadata.get("allowed")
+
+
+def known_keys(group: str) -> list[str]:
+    """Return the keys of a group ("" for the top level), sorted; empty where there is no such group."""
+    node: Any = Config
+    for name in filter(None, group.split(".")):
+        item = {item.name: item for item in fields(node)}.get(name)
+        node = item.default_factory if item is not None else None
+        if not (isinstance(node, type) and is_dataclass(node)):
+            return []
+    return sorted(item.name for item in fields(node))

@@ -1,0 +1,24 @@
+"""The experiments by name. A study is imported only when it is asked for: some need much to be imported."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from experiments.studies.study import AbsentError, Study
+
+# name of the experiment: module and class; `conf/experiment/NAME.yaml` goes with each.
+STUDIES = {
+    "plane_accuracy": "experiments.studies.plane_accuracy:PlaneAccuracy",
+    "corner_distance": "experiments.studies.corner_distance:CornerDistance",
+    "real_boards": "experiments.studies.real_boards:RealBoards",
+}
+
+
+def find_study(name: str) -> Study:
+    """Return the study of a name in `STUDIES`."""
+    module, _, attribute = STUDIES[name].partition(":")
+    study: Study = getattr(import_module(module), attribute)()
+    return study
+
+
+__all__ = ["STUDIES", "AbsentError", "Study", "find_study"]

@@ -1,0 +1,39 @@
+"""The rig as an experimenter has it: devices to photograph with, and what calibrating them gave."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+import data_synth
+from data_synth import Rig
+from deskew import pipeline
+from deskew.types import Calibration
+from experiments.settings import Config
+
+# Random numbers of the calibration shots: a trial's number that no trial has.
+_CALIBRATION = 2**32 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """A rig and its estimated calibration; the true one stays inside `rig` and is for photographs alone."""
+
+    rig: Rig
+    calibration: Calibration
+
+    def residuals(self) -> dict[str, float]:
+        """Return `calib_{camera,projector,stereo}_rms_px`."""
+        return {
+            f"calib_{name}": value for name, value in self.calibration.residuals.items() if name.endswith("_rms_px")
+        }
+
+
+def calibrated_bench(config: Config) -> Bench:
+    """Photograph the printed board in its poses and calibrate both devices from that."""
+    rig = data_synth.default_rig(config.rig.noise_scale)
+    rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION]))
+    poses = data_synth.board_poses(config.rig.board_poses)
+    captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
+    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures))

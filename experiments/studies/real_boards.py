@@ -1,0 +1,203 @@
+"""Real captures: each calibration board scanned as if it were a page, with the devices calibrated on the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import cv2
+import numpy as np
+
+from deskew import acquisition, io, metrics, pipeline, projection, restoration
+from deskew.acquisition import BoardView, DepthSettings
+from deskew.errors import require
+from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Status
+from experiments.reporting import Column, Layout
+from experiments.settings import Config
+from experiments.studies.methods import require_methods
+from experiments.studies.scanned import scanned_points
+from experiments.studies.study import AbsentError, Study
+from experiments.trials import Outcome, Recorder, TrialKey, trial_keys
+
+# The captures' own README: 9 x 7 inner corners, 75 units a square, five poses.
+BOARD = Board((9, 7), 75.0, "units")
+N_BOARDS = 5
+# Shortest length that counts; the board's inner corners span 600 x 450 units.
+_LENGTH_MIN = 400.0
+# Within this distance of a corner depth is averaged by a plane [px]; a square is 60 to 90 px wide.
+_RADIUS_PX = 28
+# The gates are meant for millimetres at 800 mm; these boards lean far and stand at 3000 to 3600 units.
+_DEPTH = DepthSettings(z_min_mm=-1500.0, z_max_mm=1500.0, neighbour_mm=6.0, jump_mm=15.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Boards:
+    """All poses as both devices see them; frames stay on disk."""
+
+    captures: tuple[Capture, ...]
+    views: tuple[BoardView, ...]
+
+
+class RealBoards(Study):
+    """A board is left out, the devices are calibrated on the other four, and the board is scanned and flattened.
+
+    Conditions
+    ----------
+    `calibration`
+        All five boards.
+    `left_out`
+        The scan of the board that the calibration has not seen: lengths over 400 units, deviation from a plane.
+    `restored`
+        The restored board's corners against exact squares, a row of figures for each method.
+    """
+
+    layout: ClassVar[Layout] = Layout(
+        "Real boards, each scanned through the calibration on the others",
+        "Lengths in units of the board (a square has 75). The restored corners are compared with exact squares after a "
+        "rotation and a translation alone.",
+        (
+            Column("calib_camera_rms_px", "camera RMS [px]", 3),
+            Column("calib_projector_rms_px", "projector RMS [px]", 3),
+            Column("calib_stereo_rms_px", "stereo RMS [px]", 3),
+            Column("length_error_units", "length error, RMS [units]", 3),
+            Column("plane_mean_abs_units", "mean deviation from a plane [units]", 3),
+            Column("corner_rigid_mean_units", "restored corners, mean [units]", 3),
+            Column("corner_rigid_max_units", "restored corners, max [units]", 3),
+            Column("corners_missing", "missing", 0),
+            Column("corners_expected", "expected", 0),
+            Column("at_rest", "at rest", 0),
+        ),
+    )
+
+    def plan(self, config: Config) -> list[TrialKey]:
+        """Plan one trial a board left out, and one for all boards."""
+        require_methods(config)
+        require(config.trials <= N_BOARDS, "trials", f"be at most {N_BOARDS}, one a board", config.trials)
+        path = config.real_boards.path
+        if path is None:
+            raise AbsentError("real_boards.path names no folder; README says where the captures are to be had")
+        if not Path(path).is_dir():
+            raise AbsentError(f"real_boards.path: there is no folder {path}")
+        return [TrialKey(config.experiment, "calibration", "-", 0, config.seed), *trial_keys(config)]
+
+    def inputs(self, config: Config) -> Mapping[str, Path]:
+        """Name the captures."""
+        return {"real_boards.path": Path(str(config.real_boards.path))}
+
+    def prepare(self, config: Config) -> _Boards:
+        """Find the board in every pose."""
+        captures = tuple(io.read_procam_graycode(Path(str(config.real_boards.path))))
+        require(len(captures) == N_BOARDS, "real_boards.path", f"hold {N_BOARDS} captures", len(captures))
+        views = tuple(acquisition.view_board(BOARD, capture, pipeline.decode(capture)) for capture in captures)
+        return _Boards(captures, views)
+
+    def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
+        """Calibrate, scan the board that was left out, flatten it, measure."""
+        boards: _Boards = shared
+        record = Recorder(key)
+        with record.stage("calibrate"):
+            kept = [v for i, v in enumerate(boards.views) if key.condition == "calibration" or i != key.trial]
+            calibration = acquisition.calibrate(BOARD, kept)
+        residuals = {f"calib_{name}": value for name, value in calibration.residuals.items()}
+        if key.condition == "calibration":
+            record.add("calibration", "-", residuals)
+            return record.outcome()
+        record.add("left_out", "-", residuals)
+        _measure_board(record, config, boards.captures[key.trial], boards.views[key.trial], calibration)
+        return record.outcome()
+
+
+def _measure_board(
+    record: Recorder, config: Config, capture: Capture, view: BoardView, calibration: Calibration
+) -> None:
+    with record.stage("scan"):
+        depth = acquisition.depth_map(calibration, pipeline.decode(capture), _DEPTH)
+    seen = _to_view(calibration.camera, depth.camera, view.corners)
+    points = scanned_points(depth, seen, _RADIUS_PX)
+    errors = acquisition.length_errors(points, acquisition.board_points(BOARD), _LENGTH_MIN)
+    deviation = acquisition.plane_deviation(points[np.isfinite(points).all(axis=1)])
+    figures = {"length_error_units": float(np.sqrt((errors**2).mean())), "plane_mean_abs_units": deviation.mean_abs_mm}
+    record.add("left_out", "-", figures)
+    on_bed = _board_on_bed(calibration, points)
+    outline = acquisition.straight_outline(_border(seen))
+    with record.stage("mesh"):
+        shape = (config.mesh.rows, config.mesh.columns)
+        scan = pipeline.scan(capture, on_bed, shape=shape, outline=outline, depth=_DEPTH, max_hole_px=60.0)
+    for method in config.methods:
+        with record.attempt("restored", method):
+            with record.stage("restore", "restored", method):
+                restored = pipeline.restore(scan, method=method)
+            _measure_restored(record, method, restored, seen)
+            name = f"board_{record.key.trial}"
+            record.picture(f"{name}_unrestored", restoration.undistorted_view(capture.white, calibration.camera))
+            record.picture(f"{name}_{method}", _from_above(restored))
+
+
+def _measure_restored(record: Recorder, method: str, restored: Restoration, seeds: Floats) -> None:
+    """Compare restored corners with exact squares; the board is flat, so they lie within pixels of where they were."""
+    found = acquisition.refine_saddle(restored.image, seeds, search_px=8.0)
+    here = np.isfinite(found).all(axis=1)
+    figures = {"corners_missing": float((~here).sum()), "corners_expected": float(len(found))}
+    places = projection.onto_bed(restored.camera, found[here])[:, :2]
+    exact = acquisition.board_points(BOARD)[here, :2]
+    distance = np.linalg.norm(metrics.fit_rigid(places, exact).apply(places) - exact, axis=1)
+    figures |= {"corner_rigid_mean_units": float(distance.mean()), "corner_rigid_max_units": float(distance.max())}
+    if restored.flattened is not None:
+        figures |= restored.flattened.counters
+        figures["at_rest"] = float(restored.flattened.status is Status.AT_REST)
+    record.add("restored", method, figures)
+
+
+def _to_view(camera: Pinhole, view: Pinhole, raw: Floats) -> Floats:
+    return np.asarray(projection.undistort(camera, raw) @ view.K[:2, :2].T + view.K[:2, 2])
+
+
+def _border(corners: Floats) -> Floats:
+    """Return the outer corners (4, 2) [px] of the board's outermost squares, a homography beyond the inner corners."""
+    nx, ny = BOARD.shape
+    grid = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2).astype(np.float64)
+    homography, _ = cv2.findHomography(grid, corners)
+    rim = np.array([(-0.9, -0.9), (nx - 0.1, -0.9), (nx - 0.1, ny - 0.1), (-0.9, ny - 0.1)])
+    return np.asarray(cv2.perspectiveTransform(rim.reshape(-1, 1, 2), homography)).reshape(4, 2)
+
+
+def _board_on_bed(calibration: Calibration, points: Floats) -> Calibration:
+    """Move the world so that the scanned board's best-fit plane is its Z = 0, X along the board's rows."""
+    known = points[np.isfinite(points).all(axis=1)]
+    normal, offset = acquisition.fit_plane(known)
+    # Z points towards the camera.
+    if normal @ projection.centre(calibration.camera) < offset:
+        normal, offset = -normal, -offset
+    along = points[-1] - points[0] if np.isfinite(points[[0, -1]]).all() else known[-1] - known[0]
+    x = np.linalg.norm(along) * np.cross(np.cross(normal, along), normal)
+    x /= np.linalg.norm(x)
+    R = np.stack([x, np.cross(normal, x), normal])
+    middle = known.mean(axis=0)
+    t = -R @ (middle - (middle @ normal - offset) * normal)
+    return Calibration(
+        _in_world(calibration.camera, R, t),
+        _in_world(calibration.projector, R, t),
+        calibration.residuals,
+        calibration.uncertainty,
+        calibration.n_poses,
+        calibration.unit,
+    )
+
+
+def _in_world(device: Pinhole, R: Floats, t: Floats) -> Pinhole:
+    """Return the device after the world was moved by ``X' = R X + t``."""
+    return Pinhole(device.size, device.K, device.distortion, device.R @ R.T, device.t - device.R @ R.T @ t)
+
+
+def _from_above(restored: Restoration, unit_px: float = 1.0) -> Array:
+    """Return the flattened board as seen straight from above, `unit_px` pixels a unit: a view that shows any bend."""
+    nx, ny = BOARD.shape
+    half_x, half_y = (BOARD.square * (n + 1) / 2 for n in (nx, ny))
+    # The diagonal of the inner corners was laid along X.
+    turn = np.arctan2(-(ny - 1), nx - 1)
+    x, y = np.meshgrid(np.arange(-half_x, half_x, 1 / unit_px), np.arange(half_y, -half_y, -1 / unit_px))
+    world = np.stack([x * np.cos(turn) + y * np.sin(-turn), y * np.cos(turn) + x * np.sin(turn), 0 * x], axis=-1)
+    pixels = projection.project(restored.camera, world).astype(np.float32)
+    return np.asarray(cv2.remap(restored.image, pixels[..., 0], pixels[..., 1], cv2.INTER_LINEAR))

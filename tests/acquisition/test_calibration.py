@@ -1,0 +1,121 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from deskew.acquisition.bundle import Bundle, on_board
+from deskew.acquisition.calibration import BoardView, board_points, calibrate
+from deskew.errors import InputError, StepError
+from deskew.projection import centre, project
+from deskew.types import Board, Pinhole
+
+BOARD = Board((9, 6), 20.0)
+CAMERA = Pinhole(
+    (640, 480), np.array([[1700.0, 0, 322], [0, 1705, 236], [0, 0, 1]]), np.array([-0.12, 0.1, 1e-3, -5e-4, 0]),
+    np.eye(3), np.zeros(3),
+)  # fmt: skip
+# A table projector: its principal point lies below its frame.
+PROJECTOR = Pinhole(
+    (1024, 768), np.array([[2600.0, 0, 520], [0, 2610, 840], [0, 0, 1]]), np.array([-0.05, 0.02, -5e-4, 1e-3, 0]),
+    Rotation.from_euler("yx", [-23, 6], degrees=True).as_matrix(), np.array([320.0, 60.0, 30.0]),
+)  # fmt: skip
+
+
+def _poses():
+    face_up = Rotation.from_euler("x", 180, degrees=True)
+    tilts = [(0, 0), (20, 0), (-20, 5), (0, 22), (5, -22), (15, 15), (-15, 15), (15, -18), (-10, -12)]
+    heights = [0, 40, 10, 30, 20, 50, 60, 25, 35]
+    rotations = [Rotation.from_euler("xy", tilt, degrees=True) * face_up for tilt in tilts]
+    return np.array(
+        [
+            [*r.as_rotvec(), 8 * i - 30, 20 - 4 * i, 800 - h]
+            for i, (r, h) in enumerate(zip(rotations, heights, strict=True))
+        ]
+    )
+
+
+def _views(camera_noise=0.0, projector_noise=0.0, n_pixels=300, n_poses=9, seed=0):
+    rng = np.random.default_rng(seed)
+    poses = _poses()[:n_poses]
+    truth = Bundle(CAMERA, PROJECTOR, poses)
+    points = board_points(BOARD)
+    views = []
+    for i, pose in enumerate(poses):
+        placed = Rotation.from_rotvec(pose[:3]).apply(points) + pose[3:]
+        corners = project(CAMERA, placed)
+        low, high = corners.min(0), corners.max(0)
+        pixels = np.rint(rng.uniform(low, high, (n_pixels, 2)))
+        projected = project(PROJECTOR, on_board(truth, pixels, np.full(n_pixels, i)))
+        views.append(BoardView(
+            corners + camera_noise * rng.standard_normal(corners.shape), pixels,
+            projected + projector_noise * rng.standard_normal(pixels.shape), CAMERA.size, PROJECTOR.size,
+        ))  # fmt: skip
+    return views
+
+
+def _parameters(device):
+    return np.array([device.K[0, 0], device.K[1, 1], device.K[0, 2], device.K[1, 2], *device.distortion[:4]])
+
+
+def test_exact_observations_give_the_exact_devices():
+    calibration = calibrate(BOARD, _views())
+    for got, true in ((calibration.camera, CAMERA), (calibration.projector, PROJECTOR)):
+        assert np.allclose(_parameters(got), _parameters(true), atol=2e-3)
+    baseline = np.linalg.norm(centre(calibration.projector) - centre(calibration.camera))
+    assert baseline == pytest.approx(np.linalg.norm(PROJECTOR.t), abs=1e-3)
+    assert all(0 <= value < 1e-3 for value in calibration.residuals.values())
+
+
+def test_world_is_the_first_board():
+    calibration = calibrate(BOARD, _views())
+    pixels = project(calibration.camera, board_points(BOARD))
+    assert np.allclose(pixels, _views()[0].corners, atol=1e-3)
+    assert centre(calibration.camera)[2] > 700  # Z points up, towards the camera
+
+
+def test_errors_agree_with_the_stated_uncertainty():
+    """Over both devices' parameters the error in units of its stated deviation is about 1."""
+    scores = []
+    for seed in range(4):
+        calibration = calibrate(BOARD, _views(0.03, 0.05, seed=seed))
+        names = [*calibration.uncertainty][:16]
+        error = np.concatenate([_parameters(calibration.camera) - _parameters(CAMERA),
+                                _parameters(calibration.projector) - _parameters(PROJECTOR)])  # fmt: skip
+        scores.append(error / [calibration.uncertainty[name] for name in names])
+    # Pixels of one square count once, so with independent noise the statement is on the safe side.
+    assert 0.15 < np.sqrt(np.mean(np.square(scores))) < 1.3
+
+
+def test_residuals_state_the_noise():
+    calibration = calibrate(BOARD, _views(0.03, 0.05))
+    assert calibration.residuals["camera_rms_px"] == pytest.approx(0.03 * np.sqrt(2), rel=0.1)
+    assert calibration.residuals["projector_rms_px"] == pytest.approx(0.05 * np.sqrt(2), rel=0.1)
+    assert calibration.residuals["stereo_rms_px"] == pytest.approx(np.sqrt(0.03**2 + 0.05**2), rel=0.1)
+
+
+def test_wild_pixels_are_rejected():
+    views = _views(0.03, 0.05)
+    wild = views[2].projected.copy()
+    wild[::20] += 30.0
+    views[2] = replace(views[2], projected=wild)
+    calibration = calibrate(BOARD, views)
+    assert np.abs(_parameters(calibration.projector)[2:4] - (520, 840)).max() < 6.0
+    assert calibration.residuals["stereo_rms_px"] < 0.07
+
+
+def test_too_few_poses_are_refused_with_what_to_add():
+    with pytest.raises(StepError, match="2 poses are too few, at least 3"):
+        calibrate(BOARD, _views(n_poses=2))
+
+
+def test_parallel_boards_are_refused_with_what_to_add():
+    with pytest.raises(StepError, match=r"tilts differ by .* add poses tilted by 15 to 30 degrees"):
+        calibrate(BOARD, [_views(n_poses=1)[0]] * 5)
+
+
+def test_views_of_two_cameras_are_refused():
+    views = _views()
+    views[3] = replace(views[3], camera_size=(800, 600))
+    with pytest.raises(InputError, match="`views` must be of one camera"):
+        calibrate(BOARD, views)

@@ -1,0 +1,344 @@
+"""The command line against a pipeline of stand-ins: what it reads, writes, prints and refuses."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import deskew
+from deskew import io
+from deskew.cli import main
+from deskew.errors import StepError
+from deskew.types import (
+    Board,
+    Calibration,
+    Capture,
+    DepthMap,
+    Flattened,
+    PatternKind,
+    Pinhole,
+    Restoration,
+    Scan,
+    Sheet,
+    Status,
+)
+
+COMMANDS = ("calibrate", "scan", "accuracy", "restore", "run")
+SIZE = (12, 8)
+CAMERA = Pinhole(
+    SIZE, np.array([[10.0, 0, 5.5], [0, 10, 3.5], [0, 0, 1]]), np.zeros(5), np.eye(3), np.array([0, 0, 9.0])
+)
+CALIBRATION = Calibration(
+    CAMERA, CAMERA, {"camera_rms_px": 0.1, "projector_rms_px": 0.2, "stereo_rms_px": 0.3}, {}, 2, "mm"
+)
+
+
+def capture(seed: int = 0) -> Capture:
+    rng = np.random.default_rng(seed)
+    white, black, *planes = (rng.integers(0, 255, (8, 12), dtype=np.uint8) for _ in range(14))
+    return Capture(white, black, (6, 5), PatternKind.GRAY_CODE, planes[:6], planes[6:])
+
+
+class StandIn:
+    """Records what the command passes on, and answers with fixed values."""
+
+    def __init__(self) -> None:
+        self.calls: dict[str, Any] = {}
+        self.status = Status.AT_REST
+        self.fails: str | None = None
+
+    def _step(self, name: str, **values: Any) -> None:
+        if self.fails == name:
+            raise StepError(f"{name} found no page: put it on a darker desk.")
+        self.calls[name] = values
+
+    def calibrate(self, board: Board, captures: Iterable[Capture]) -> Calibration:
+        poses = [np.stack([*c.columns, *c.rows]) for c in captures]
+        self._step("calibrate", board=board, poses=poses)
+        return replace(CALIBRATION, n_poses=len(poses))
+
+    def scan(self, page: Capture, calibration: Calibration, *, shape: tuple[int, int]) -> Scan:
+        frames = [*page.columns, *page.rows]
+        self._step("scan", frames=frames, calibration=calibration, shape=shape)
+        reason = np.zeros((8, 12), np.uint8)
+        reason[0, :3] = 1
+        depth = DepthMap(np.where(reason == 0, 9.0, np.nan), reason, CAMERA)
+        x, y = np.meshgrid(np.linspace(-1, 1, shape[1]), np.linspace(1, -1, shape[0]))
+        sheet = Sheet(np.stack([x, y, 0 * x], -1))
+        return Scan({"white": page.white}, depth, CAMERA, sheet, np.zeros((4, 2)))
+
+    def restore(self, scan: Scan, *, method: str) -> Restoration:
+        self._step("restore", scan=scan, method=method)
+        remedy = "" if self.status is Status.AT_REST else "push harder"
+        flattened = Flattened(
+            scan.sheet.vertices, self.status, remedy, {"steps": 7, "spring_energy": np.float64("nan")}
+        )
+        return Restoration(scan.images["white"][::-1].copy(), np.zeros((8, 12, 2), np.float32), CAMERA, flattened)
+
+
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> StandIn:
+    stand_in = StandIn()
+    monkeypatch.setattr(deskew, "pipeline", stand_in, raising=False)
+    monkeypatch.setitem(sys.modules, "deskew.pipeline", stand_in)
+    return stand_in
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working folder with valid inputs of every kind, and an empty `out`."""
+    io.write_capture(capture(), tmp_path / "page")
+    io.write_board(Board((5, 4), 25.0), [capture(1), capture(2)], tmp_path / "board")
+    io.write_calibration(CALIBRATION, tmp_path / "c.json")
+    io.write_scan(StandIn().scan(capture(), CALIBRATION, shape=(3, 4)), tmp_path / "scan.npz")
+    (tmp_path / "out").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(line: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    code = main(line.split())
+    printed = capsys.readouterr()
+    return code, printed.out, printed.err
+
+
+def test_calibrate_reads_a_board_and_writes_a_calibration(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = run("calibrate board -o out/c.json --json", capsys)
+    assert (code, err) == (0, "")
+    assert json.loads(out) == {"calibration": "out/c.json", "n_poses": 2, **CALIBRATION.residuals}
+    assert steps.calls["calibrate"]["board"] == Board((5, 4), 25.0)
+    wanted = [np.stack([*capture(seed).columns, *capture(seed).rows]) for seed in (1, 2)]
+    assert np.array_equal(steps.calls["calibrate"]["poses"], wanted)
+    assert io.read_calibration(here / "out" / "c.json").n_poses == 2
+
+
+@pytest.mark.parametrize(("option", "shape"), [("", (45, 45)), ("--shape 3 5", (3, 5))])
+def test_scan_writes_everything_for_restore(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], option: str, shape: tuple[int, int]
+) -> None:
+    code, out, err = run(f"scan page --calibration c.json -o out/s.npz --json {option}", capsys)
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    assert figures["vertices"] == shape[0] * shape[1]
+    assert figures["depth_pixels"] == 93
+    assert figures["missing_pixels"]["shadow"] == 3
+    assert steps.calls["scan"]["shape"] == shape
+    assert io.read_scan(here / "out" / "s.npz").sheet.vertices.shape == (*shape, 3)
+    assert run("restore out/s.npz -o out/r.png", capsys)[0] == 0
+    assert np.array_equal(io.read_image(here / "out" / "r.png"), capture().white[::-1])
+
+
+def test_a_scanned_mesh_carries_its_place_in_the_white_image(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("scan page -c c.json -o out/s.ply --shape 2 2", capsys)[0] == 0
+    mesh = io.read_mesh(here / "out" / "s.ply")
+    assert mesh.vertices.tolist() == [[-1, 1, 0], [1, 1, 0], [-1, -1, 0], [1, -1, 0]]
+    # x = 10 * X / 9 + 5.5 px of 12, its centre at + 0.5; y likewise of 8, and t runs upwards.
+    s, t = (5.5 + 10 / 9 + 0.5) / 12, 1 - (3.5 + 10 / 9 + 0.5) / 8
+    assert mesh.texture is not None
+    assert np.allclose(mesh.texture, [[1 - s, t], [s, t], [1 - s, 1 - t], [s, 1 - t]], rtol=0, atol=1e-12)
+
+
+def test_run_goes_from_a_folder_to_a_page(here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run("run page -c c.json -o out/r.tif --method paper_rk4 --json", capsys)
+    assert (code, err) == (0, "")
+    figures = {"restored": "out/r.tif", "method": "paper_rk4", "status": "at_rest", "steps": 7, "spring_energy": None}
+    assert json.loads(out) == figures
+    assert steps.calls["restore"]["method"] == "paper_rk4"
+    assert len(steps.calls["scan"]["frames"]) == 12
+    assert np.array_equal(io.read_image(here / "out" / "r.tif"), capture().white[::-1])
+
+
+def test_accuracy_measures_the_page_and_not_the_desk(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    acquisition = importlib.import_module("deskew.acquisition")
+    monkeypatch.setattr(deskew, "pipeline", SimpleNamespace(decode=lambda page: len(list(page.columns))), raising=False)
+    z = np.full((8, 12), 9.0)
+    z[:, :3] = 5.0  # the desk
+    z[4, 6] = 9.5
+    depth = DepthMap(z, np.zeros((8, 12), np.uint8), CAMERA)
+    corners = np.array([[4.0, 1], [10, 1], [10, 6], [4, 6]])
+    monkeypatch.setattr(acquisition, "depth_map", lambda devices, seen: depth)
+    monkeypatch.setattr(acquisition, "page_outline", lambda *images: SimpleNamespace(corners=corners))
+    code, out, err = run("accuracy page page -c c.json --json", capsys)
+    assert (code, err) == (0, "")
+    figures = json.loads(out)
+    assert [row["capture"] for row in figures["planes"]] == ["page", "page"]
+    assert figures["planes"][0]["n"] == 7 * 6
+    assert 0.3 < figures["average"]["max_mm"] < 0.5
+    assert run("accuracy page -c c.json", capsys)[1].startswith("capture: page\nmean_abs_mm: 0.0")
+
+
+@pytest.mark.parametrize("status", [Status.LOCKED, Status.FOLDED])
+def test_a_page_that_is_not_flat_is_shown_and_said_so(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], status: Status
+) -> None:
+    steps.status = status
+    code, out, err = run("run page -c c.json -o out/r.png --json", capsys)
+    assert (code, json.loads(out)["status"]) == (0, status)
+    assert err == f"deskew: warning: the page is {status}, not at rest and flat: push harder\n"
+    assert (here / "out" / "r.png").exists()
+
+
+def test_a_diverged_page_is_a_failed_step(here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
+    steps.status = Status.DIVERGED
+    assert run("run page -c c.json -o out/r.png", capsys) == (3, "", "deskew: Flattening diverged: push harder\n")
+    assert list((here / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("step", "line"),
+    [
+        ("calibrate", "calibrate board -o out/c.json"),
+        ("scan", "scan page -c c.json -o out/s.npz"),
+        ("scan", "run page -c c.json -o out/r.png"),
+        ("restore", "restore scan.npz -o out/r.png"),
+    ],
+)
+def test_a_failed_step_is_one_line_and_code_3(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], step: str, line: str
+) -> None:
+    steps.fails = step
+    assert run(line, capsys) == (3, "", f"deskew: {step} found no page: put it on a darker desk.\n")
+    assert list((here / "out").iterdir()) == []
+
+
+WRONG_LINES = {
+    "nothing": ("", "Missing command."),
+    "unknown command": ("scna page", "No such command 'scna'"),
+    "unknown option": ("scan page -c c.json -o out/s.npz --fast", "No such option: --fast"),
+    "unknown option of the program": ("--verbose scan", "No such option: --verbose"),
+    "no capture": ("scan -c c.json -o out/s.npz", "Missing argument 'CAPTURE'"),
+    "no calibration": ("run page -o out/r.png", "Missing option '--calibration'"),
+    "no output": ("run page -c c.json", "Missing option '--output'"),
+    "no planes": ("accuracy -c c.json", "Missing argument 'CAPTURE...'"),
+    "two captures": ("run page page -c c.json -o out/r.png", "unexpected extra argument"),
+    "shape of one": ("run page -c c.json -o out/r.png --shape 45", "'--shape' requires 2 arguments"),
+    "shape of words": ("run page -c c.json -o out/r.png --shape 45 x", "Invalid value for '--shape'"),
+    "shape of fractions": ("run page -c c.json -o out/r.png --shape 4.5 4", "Invalid value for '--shape'"),
+    "shape 1": ("run page -c c.json -o out/r.png --shape 1 45", "`--shape` must be at least 2 vertices down and 2"),
+    "shape negative": ("scan page -c c.json -o out/s.npz --shape -4 -4", "`--shape` must be at least 2"),
+    "no such capture": ("scan gone -c c.json -o out/s.npz", "`gone` must be a folder, got nothing there"),
+    "capture a file": ("scan c.json -c c.json -o out/s.npz", "`c.json` must be a folder, got a file"),
+    "board for capture": ("scan board -c c.json -o out/s.npz", "`board/capture.toml` must be a file"),
+    "capture for board": ("calibrate page -o out/c.json", "`page/board.toml` must be a file"),
+    "no such calibration": ("scan page -c gone.json -o out/s.npz", "`gone.json` must be a file, got nothing there"),
+    "calibration a folder": ("scan page -c board -o out/s.npz", "`board` must be a file, got a folder"),
+    "image for calibration": ("scan page -c page/white.png -o out/s.npz", "`page/white.png` must be valid JSON"),
+    "toml for calibration": ("scan page -c page/capture.toml -o out/s.npz", "must be valid JSON"),
+    "image for scan": ("restore page/white.png -o out/r.png", "`page/white.png` must be a whole NPZ file"),
+    "no such scan": ("restore gone.npz -o out/r.png", "`gone.npz` must be a file, got nothing there"),
+    "output a JPEG": ("run page -c c.json -o out/r.jpg", "`out/r.jpg` must end in .png or .tif or .tiff, got .jpg"),
+    "output without suffix": ("calibrate board -o out/c", "`out/c` must end in .json, got no suffix"),
+    "output in no folder": ("scan page -c c.json -o no/s.npz", "`no/s.npz` must lie in an existing folder"),
+    "output under a file": ("scan page -c c.json -o c.json/s.npz", "must lie in an existing folder"),
+    "output a folder": ("calibrate board -o out/d.json", "`out/d.json` must be a file name, got a folder"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", list(WRONG_LINES))
+def test_a_wrong_line_is_one_line_and_code_2(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], case: str
+) -> None:
+    (here / "out" / "d.json").mkdir()
+    line, message = WRONG_LINES[case]
+    code, out, err = run(line, capsys)
+    assert (code, out) == (2, "")
+    assert err.startswith("deskew: ")
+    assert message in err
+    assert err.count("\n") == 1
+    assert err.endswith("\n")
+    assert [p.name for p in (here / "out").rglob("*")] == ["d.json"]
+    assert not steps.calls
+
+
+WRONG_INPUTS: dict[str, tuple[Callable[[Path], object], str]] = {
+    "frame missing": (lambda d: (d / "page/gray/04.png").unlink(), "run page -c c.json -o out/r.png"),
+    "frame cut": (lambda d: (d / "page/gray/04.png").write_bytes(b"\x89PNG\r\n"), "scan page -c c.json -o out/s.npz"),
+    "name with line breaks": (lambda d: (d / "page/gray/a\nb\x1b[2J.png").touch(), "scan page -c c.json -o out/s.ply"),
+    "pose damaged": (lambda d: (d / "board/pose_01/white.png").write_bytes(b"x"), "calibrate board -o out/c.json"),
+    "second plane missing": (lambda d: (d / "c.json").write_text("{}"), "accuracy page gone -c c.json"),
+    "scan damaged": (lambda d: (d / "scan.npz").write_bytes(b"PK\3\4" + bytes(99)), "restore scan.npz -o out/r.png"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", list(WRONG_INPUTS))
+def test_a_wrong_input_is_one_line_and_code_2(
+    here: Path, steps: StandIn, capfd: pytest.CaptureFixture[str], case: str
+) -> None:
+    break_it, line = WRONG_INPUTS[case]
+    break_it(here)
+    code = main(line.split())
+    printed = capfd.readouterr()
+    assert (code, printed.out, printed.err.count("\n")) == (2, "", 1)
+    assert printed.err.startswith("deskew: `")
+    assert printed.err.rstrip("\n").isprintable()
+    assert list((here / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("error", [OSError(5, "Input/output error"), MemoryError()])
+def test_a_failing_machine_is_one_line_and_code_3(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    def fail(*args: Any, **kwargs: Any) -> Scan:
+        raise error
+
+    monkeypatch.setattr(steps, "scan", fail)
+    code, out, err = run("run page -c c.json -o out/r.png", capsys)
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    assert err.startswith("deskew: The system refused: ")
+    assert list((here / "out").iterdir()) == []
+
+
+def test_an_interrupt_leaves_nothing(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*args: Any, **kwargs: Any) -> Scan:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(steps, "scan", stop)
+    assert run("run page -c c.json -o out/r.png", capsys)[0] == 130
+    assert list((here / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_shows_an_example(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    code, out, err = run(f"{command} --help", capsys)
+    assert (code, err) == (0, "")
+    assert f"Example: deskew {command} " in " ".join(out.split())
+
+
+def test_help_loads_no_stage_and_lists_the_commands() -> None:
+    """In a process of its own, by the module's name: what a user waits for when she asks for help."""
+    code = (
+        "import sys, runpy\n"
+        "sys.argv = ['deskew', '--help']\n"
+        "try: runpy.run_module('deskew', run_name='__main__')\n"
+        "except SystemExit as end: code = end.code\n"
+        "slow = {'numba', 'cv2', 'scipy', 'trimesh'} & set(sys.modules)\n"
+        "sys.exit(f'{slow}' if slow else code)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert all(f"\n  {command} " in done.stdout for command in COMMANDS)
+
+
+def test_the_module_ends_with_the_exit_code() -> None:
+    line = [sys.executable, "-m", "deskew", "scan", "nowhere", "-c", "c.json", "-o", "s.npz"]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "deskew: `c.json` must be a file, got nothing there.\n"

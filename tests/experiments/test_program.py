@@ -1,0 +1,194 @@
+"""The program from its command line: what it accepts, what it refuses and how, what it leaves behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.program import main
+from tests.experiments.conftest import Program
+from tests.experiments.fake_study import ABSENT, ALL_FAIL, NAN, STEP_FAILS, TRIAL_1_FAILS
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize(
+    ("override", "names"),
+    [
+        ("trials=0", ("`trials`", "[1, 100000]", "got 0")),
+        ("trials=many", ("`trials`", "[1, 100000]", "'many'")),
+        ("seed=-1", ("`seed`", "[0, 4294967295]", "-1")),
+        ("sheet.slope_p90_deg=95", ("`sheet.slope_p90_deg`", "[1, 60] degrees", "95.0")),
+        ("sheet.slope_p90_deg=nan", ("`sheet.slope_p90_deg`", "[1, 60]", "nan")),
+        ("sheet.slope_p90_deg=steep", ("`sheet.slope_p90_deg`", "[1, 60] degrees", "'steep'")),
+        ("sheet.kind=silk", ("`sheet.kind`", "mirror", "'silk'")),
+        ("sheet.paths=[a.png]", ("`sheet.paths`", "NPZ", "a.png")),
+        ("rig.noise_scale=-0.5", ("`rig.noise_scale`", "[0, 10]", "-0.5")),
+        ("rig.colour=red", ("`rig.colour`", "noise_scale")),
+        ("mesh.rows=1", ("`mesh.rows`", "[2, 1000]", "1")),
+        ("colour=red", ("`colour`", "one of budget, engine, experiment")),
+        ("+x=1", ("`x`", "existing key", "+x=1")),
+        ("++seed=3", ("`seed`", "++seed=3")),
+        ("~seed", ("`seed`", "~seed")),
+        ("method=3", ("`method`", "list of different names", "3")),
+        ("method=[a,a]", ("`method`", "different", "['a', 'a']")),
+        ("method=[]", ("`method`", "[]")),
+        ("budget=huge", ("`budget`", "full, paper, smoke", "'huge'")),
+        ("engine=ray", ("`engine`", "processes, serial", "'ray'")),
+        ("engine=slurm", ("`engine`", "processes, serial", "'slurm'")),
+        ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
+        ("experiment=stiffness", ("`experiment`", "corner_distance, fake, plane_accuracy, real_boards", "'stiffness'")),
+        ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
+        ("trials", ("`trials`", "KEY=VALUE")),
+        ("--nonsense", ("--nonsense", "KEY=VALUE")),
+        ("out=/dev/null/x", ("`out`", "/dev/null/x")),
+    ],
+)
+def test_wrong_input_is_one_line_and_code_2(
+    program: Program, out: Path, capsys: pytest.CaptureFixture[str], override: str, names: tuple[str, ...]
+) -> None:
+    assert program(override) == 2
+    written = capsys.readouterr()
+    assert written.out == ""
+    assert len(written.err.splitlines()) == 1
+    for name in names:
+        assert name in written.err
+    assert not out.exists()
+
+
+def test_without_an_experiment_the_program_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 2
+    error = capsys.readouterr().err
+    assert error.splitlines() == [
+        "`experiment` must be one of corner_distance, plane_accuracy, real_boards, got nothing."
+    ]
+
+
+def test_every_planned_study_has_a_configuration_and_every_configuration_its_study() -> None:
+    from experiments.studies import STUDIES
+
+    assert {path.stem for path in (ROOT / "conf/experiment").glob("*.yaml")} == set(STUDIES) - {"fake"}
+
+
+def test_a_run_leaves_its_contracted_files_and_no_others(program: Program, out: Path) -> None:
+    assert program() == 0
+    found = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
+    pages = {f"figures/page_{trial}.png" for trial in range(4)}
+    files = {"results.sqlite", "results.csv", "timings.csv", "table.md", "run.json", "figures/corners.png"}
+    assert found == files | pages
+    assert {path.name for path in out.parent.iterdir()} == {"log", "out"}
+
+
+def test_results_are_tidy_sorted_and_hold_no_times(program: Program, out: Path) -> None:
+    assert program("seed=7", "trials=2", "method=a") == 0
+    lines = (out / "results.csv").read_text().splitlines()
+    assert lines[0] == "experiment,condition,method,trial,seed,metric,value,unit"
+    assert [line.split(",")[:6] for line in lines[1:]] == [
+        ["fake", "control", "-", "0", "7", "corner_mean_px"],
+        ["fake", "control", "-", "1", "7", "corner_mean_px"],
+        ["fake", "restored", "a", "0", "7", "corner_mean_px"],
+        ["fake", "restored", "a", "0", "7", "corners_missing"],
+        ["fake", "restored", "a", "1", "7", "corner_mean_px"],
+        ["fake", "restored", "a", "1", "7", "corners_missing"],
+    ]
+    assert [line.rsplit(",", 1)[1] for line in lines[3:5]] == ["px", "1"]
+    metrics = {line.split(",")[5] for line in (out / "timings.csv").read_text().splitlines()[1:]}
+    assert metrics == {"seconds_render", "seconds_prepare", "peak_mb"}
+
+
+@pytest.mark.parametrize(("budget", "trials"), [("smoke", 2), ("paper", 4), ("full", 6)])
+def test_budget_sets_the_trials(program: Program, log: Path, budget: str, trials: int) -> None:
+    assert program(f"budget={budget}", "method=a") == 0
+    assert log.read_text().splitlines() == ["prepare", *(f"trial {trial}" for trial in range(trials))]
+
+
+def test_explicit_trials_override_the_budget(program: Program, log: Path) -> None:
+    assert program("budget=full", "trials=1") == 0
+    assert log.read_text().splitlines() == ["prepare", "trial 0"]
+
+
+def test_smoke_never_writes_into_the_committed_reports(program: Program, capsys: pytest.CaptureFixture[str]) -> None:
+    assert program("budget=smoke", f"out={ROOT / 'reports' / 'fake'}") == 2
+    assert "reports/" in capsys.readouterr().err
+    assert not (ROOT / "reports" / "fake").exists()
+
+
+def test_absent_data_is_said_and_leaves_the_committed_report(
+    program: Program, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out.mkdir()
+    (out / "table.md").write_text("committed")
+    assert program(f"sheet.slope_p90_deg={ABSENT}") == 0
+    assert "fake: absent: no data" in capsys.readouterr().out
+    assert [(path.name, path.read_text()) for path in out.iterdir()] == [("table.md", "committed")]
+
+
+def test_failing_preparation_is_one_line_and_code_3_and_leaves_nothing(
+    program: Program, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert program(f"sheet.slope_p90_deg={STEP_FAILS}") == 3
+    assert capsys.readouterr().err.splitlines() == ["Calibration found no board."]
+    assert not out.exists()
+
+
+def test_failed_trial_is_a_row_with_its_reason_and_stops_no_other(program: Program, out: Path, log: Path) -> None:
+    assert program(f"sheet.slope_p90_deg={TRIAL_1_FAILS}") == 0
+    assert log.read_text().splitlines() == ["prepare", "trial 0", "trial 2", "trial 3"]
+    assert "fake,-,-,1,1,failed,1.0,1" in (out / "results.csv").read_text().splitlines()
+    (failure,) = json.loads((out / "run.json").read_text())["failures"]
+    assert failure["trial"] == 1
+    assert failure["reason"].startswith("ValueError: sheet | is steep (fake_study.py:")
+    table = (out / "table.md").read_text()
+    assert "| 1 | 1 | - | - | ValueError: sheet / is steep" in table
+
+
+def test_nan_is_a_failure_of_its_method_alone(program: Program, out: Path) -> None:
+    assert program(f"sheet.slope_p90_deg={NAN}", "trials=1", "method=a") == 0
+    rows = [line.split(",")[1:7] for line in (out / "results.csv").read_text().splitlines()[1:]]
+    assert rows[0][:3] == ["control", "-", "0"]
+    assert rows[1:] == [["restored", "a", "0", "1", "failed", "1.0"]]
+    (failure,) = json.loads((out / "run.json").read_text())["failures"]
+    assert failure["reason"] == "`corner_mean_px` must be finite, got nan."
+
+
+def test_when_every_trial_fails_the_run_fails_and_the_old_report_stands(
+    program: Program, out: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out.mkdir()
+    (out / "results.csv").write_text("old")
+    assert program(f"sheet.slope_p90_deg={ALL_FAIL}", "method=a") == 3
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert (out / "results.csv").read_text() == "old"
+
+
+def test_multirun_gives_every_job_its_own_folder_and_the_worst_code(program: Program, out: Path) -> None:
+    assert program("--multirun", "seed=1,2", "trials=1") == 0
+    for number, seed in ((0, "1"), (1, "2")):
+        assert (out / str(number) / "results.csv").read_text().splitlines()[1].split(",")[4] == seed
+    assert program("--multirun", "trials=1,0") == 2
+
+
+def test_run_json_says_what_produced_the_numbers_and_names_no_folder(program: Program, out: Path) -> None:
+    assert program("trials=1") == 0
+    text = (out / "run.json").read_text()
+    run = json.loads(text)
+    assert set(run) == {
+        "changed_since_commit", "commit", "config", "config_hash", "experiment", "failures", "machine", "versions",
+    }  # fmt: skip
+    assert run["config"]["sheet"]["slope_p90_deg"] == 20.0
+    assert len(run["config_hash"]) == 64
+    assert run["versions"]["python"] == sys.version.split()[0]
+    assert str(out) not in text
+    assert os.uname().nodename not in text
+
+
+def test_module_ends_with_the_programs_code_and_without_traceback() -> None:
+    command = [sys.executable, "-m", "experiments", "experiment=corner_distance", "trials=0"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "`trials` must be a whole number in [1, 100000], got 0.\n"

@@ -1,0 +1,108 @@
+"""What the studies share, and what they refuse before any work is done."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from deskew.projection import ideal, pixel_grid, project, rays
+from deskew.types import Calibration, DepthMap, Floats, Pinhole
+from experiments.program import main
+from experiments.studies import STUDIES, find_study
+from experiments.studies.real_boards import _board_on_bed
+from experiments.studies.scanned import scanned_points
+from experiments.studies.views import restored_corners
+
+SIZE = (160, 120)
+K = np.array([[400.0, 0.0, 80.3], [0.0, 401.0, 59.6], [0.0, 0.0, 1.0]])
+ROTATION = cv2.Rodrigues(np.array([3.0, 0.1, -0.2]))[0]
+CAMERA = Pinhole(SIZE, K, np.array([-0.1, 0.05, 1e-3, -1e-3, 0.0]), ROTATION, np.array([5.0, -3.0, 800.0]))
+NORMAL, OFFSET = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97]), 12.0
+
+
+def plane_depth(pixels: Floats) -> Floats:
+    """Return the camera z at which the ideal camera's rays meet the plane NORMAL . x = OFFSET."""
+    origin = -CAMERA.R.T @ CAMERA.t
+    return np.asarray((OFFSET - origin @ NORMAL) / (rays(ideal(CAMERA), pixels) @ NORMAL))
+
+
+def test_points_of_a_scanned_plane_lie_in_it_at_their_own_pixels() -> None:
+    z = plane_depth(pixel_grid(SIZE))
+    # Holes and wild values, as a scan has them.
+    z[30:32, 40:60] = np.nan
+    z[60, 80] += 40.0
+    depth = DepthMap(z, (~np.isfinite(z)).astype(np.uint8), ideal(CAMERA))
+    places = np.array([(50.25, 33.5), (80.7, 61.2), (100.0, 90.0)])
+    points = scanned_points(depth, places, 6)
+    assert np.abs(points @ NORMAL - OFFSET).max() < 0.02
+    assert np.abs(project(depth.camera, points) - places).max() < 1e-6
+
+
+def test_points_without_a_neighbourhood_are_missing() -> None:
+    z = plane_depth(pixel_grid(SIZE))
+    z[:, :40] = np.nan
+    depth = DepthMap(z, (~np.isfinite(z)).astype(np.uint8), ideal(CAMERA))
+    points = scanned_points(depth, np.array([(10.0, 60.0), (np.nan, 5.0), (100.0, 60.0), (159.0, 0.0)]), 6)
+    assert np.isfinite(points).all(axis=1).tolist() == [False, False, True, False]
+
+
+def test_corners_are_found_where_the_restored_page_shows_them() -> None:
+    y, x = np.mgrid[0:60, 0:80].astype(np.float64)
+    uv = np.stack([0.5 * x + 3.0, 0.5 * y - 2.0], axis=-1)
+    uv[:, :10] = np.nan
+    corners = np.array([(20.5, 10.0), (3.5, 10.0), (200.0, 10.0)])
+    found = restored_corners(uv, corners)
+    assert found[0].tolist() == [35.0, 24.0]
+    assert np.isnan(found[1:]).all()
+
+
+def test_moving_the_world_onto_the_board_changes_no_picture_and_lays_the_board_on_the_bed() -> None:
+    rng = np.random.default_rng(2)
+    across = np.linalg.svd(NORMAL[None])[2][1:]
+    points = OFFSET * NORMAL + rng.uniform(-80, 80, (63, 2)) @ across
+    projector = Pinhole(SIZE, K, np.zeros(5), ROTATION, np.array([-200.0, 0.0, 780.0]))
+    moved = _board_on_bed(Calibration(CAMERA, projector, {}), points)
+    centre = -moved.camera.R.T @ moved.camera.t
+    assert centre[2] > 0
+    for before, after in ((CAMERA, moved.camera), (projector, moved.projector)):
+        # The same points in the new world, by the camera's frame, which has not moved.
+        here = (points @ CAMERA.R.T + CAMERA.t - moved.camera.t) @ moved.camera.R
+        assert np.abs(here[:, 2]).max() < 1e-9
+        assert np.abs(project(after, here) - project(before, points)).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["corner_distance", "plane_accuracy", "real_boards"])
+def test_every_study_documents_its_conditions(name: str) -> None:
+    study = find_study(name)
+    assert "Conditions\n" in str(type(study).__doc__)
+    assert len({column.metric for column in study.layout.columns}) == len(study.layout.columns)
+    assert name in STUDIES
+
+
+@pytest.mark.parametrize(
+    ("overrides", "names"),
+    [
+        (["experiment=corner_distance", "method=magic"], ("method", "magic")),
+        (["experiment=corner_distance", "sheet.paths=[a.npz]", "trials=2"], ("`trials`", "at most 1", "got 2")),
+        (["experiment=real_boards", "trials=6"], ("`trials`", "at most 5", "got 6")),
+    ],
+)
+def test_a_study_refuses_before_it_writes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], overrides: list[str], names: tuple[str, ...]
+) -> None:
+    assert main([*overrides, f"out={tmp_path / 'out'}"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert all(name in line for name in names)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("override", [[], ["real_boards.path=/no/such/folder"]])
+def test_real_boards_without_data_say_absent(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], override: list[str]
+) -> None:
+    assert main(["experiment=real_boards", f"out={tmp_path / 'out'}", *override]) == 0
+    assert capsys.readouterr().out.startswith("real_boards: absent: ")
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from deskew.errors import InputError, StepError
+from deskew.flattening import METHODS, ParticleSettings, flatten
+from deskew.types import Sheet, Status
+from tests.flattening.bent_sheets import flat_grid
+
+PLUGIN = """
+from deskew.errors import InputError
+from deskew.types import Flattened, Status
+
+def squash(sheet, *, lift=0.0):
+    vertices = sheet.vertices.copy()
+    vertices[..., 2] = lift
+    return Flattened(vertices, Status.AT_REST)
+
+def returns_an_array(sheet):
+    return sheet.vertices
+
+def returns_a_row(sheet):
+    return Flattened(sheet.vertices[0], Status.AT_REST)
+
+def breaks(sheet):
+    return 1 / 0
+
+def refuses(sheet):
+    raise InputError("`sheet` must be blue, got red.")
+
+a_number = 3
+"""
+
+
+@pytest.fixture
+def plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    (tmp_path / "plugged_in.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return "plugged_in"
+
+
+def test_function_from_outside_plugs_in_by_its_name(plugin: str) -> None:
+    result = flatten(Sheet(flat_grid()), method=f"{plugin}:squash", lift=2.0)
+    assert result.status is Status.AT_REST
+    assert (result.vertices[..., 2] == 2.0).all()
+
+
+@pytest.mark.parametrize("name", ["paper_heun", "", "plugged_in", ":squash", "plugged_in:"])
+def test_unknown_method_lists_the_known_ones(name: str) -> None:
+    with pytest.raises(
+        InputError, match=r"`method` must be one of paper_euler, paper_rk4, or package\.module:function"
+    ):
+        flatten(Sheet(flat_grid()), method=name)
+
+
+def test_missing_module_or_function_is_named(plugin: str) -> None:
+    with pytest.raises(InputError, match="No module named 'no_such_module'"):
+        flatten(Sheet(flat_grid()), method="no_such_module:squash")
+    for attribute in ("no_such_function", "a_number"):
+        with pytest.raises(InputError, match="`method` must name a function in plugged_in"):
+            flatten(Sheet(flat_grid()), method=f"{plugin}:{attribute}")
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        ("returns_an_array", "must return a Flattened, got ndarray"),
+        ("returns_a_row", r"must keep the shape \(9, 11, 3\), got \(11, 3\)"),
+        ("breaks", "failed: ZeroDivisionError"),
+    ],
+)
+def test_misbehaving_function_from_outside_is_a_step_error(plugin: str, function: str, message: str) -> None:
+    with pytest.raises(StepError, match=message):
+        flatten(Sheet(flat_grid()), method=f"{plugin}:{function}")
+
+
+def test_error_of_a_function_from_outside_in_our_wording_passes(plugin: str) -> None:
+    with pytest.raises(InputError, match="must be blue"):
+        flatten(Sheet(flat_grid()), method=f"{plugin}:refuses")
+
+
+@pytest.mark.parametrize("method", sorted(METHODS))
+def test_unknown_setting_is_refused_by_name(method: str) -> None:
+    with pytest.raises(InputError, match=r"`stifness` must be a setting of the particle system \(k_s, .*halving\)"):
+        flatten(Sheet(flat_grid()), method=method, stifness=2.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *[(name, value) for name in ("k_s", "mass", "eps_mm", "dt") for value in (0, -1.0, np.nan, np.inf, "1", True)],
+        *[
+            (name, value)
+            for name in ("k_d", "gravity", "weak_gravity", "drag")
+            for value in (-1e-9, np.nan, np.inf, "1")
+        ],
+        *[("k_r", value) for value in (-0.1, 1.1, np.nan, None)],
+        *[("max_steps", value) for value in (0, -5, 2.5, True)],
+        ("k_s", None),
+        ("halving", "thirds"),
+    ],
+)
+def test_setting_out_of_range_is_refused_by_name(name: str, value: object) -> None:
+    with pytest.raises(InputError, match=rf"`{name}` must .*, got "):
+        ParticleSettings(**{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("k_r", [0, 0.0, 0.1, 1, 1.0])
+def test_restitution_may_be_anything_from_0_to_1(k_r: float) -> None:
+    assert flatten(Sheet(flat_grid()), k_r=k_r).status is Status.AT_REST
+
+
+def test_mixed_numbers_of_numpy_are_numbers() -> None:
+    assert ParticleSettings(k_s=np.float64(2.0)).k_s == 2.0

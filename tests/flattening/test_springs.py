@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from deskew.errors import InputError
+from deskew.flattening.springs import chord_springs
+from deskew.types import Sheet
+from tests.flattening.bent_sheets import flat_grid
+
+
+def joined(grid: tuple[int, int]) -> set[frozenset[int]]:
+    """Every pair that figure 2b joins, found by asking each two vertices of each quad."""
+    index = np.arange(grid[0] * grid[1]).reshape(grid)
+    quads = [index[r : r + 2, c : c + 2].ravel() for r in range(grid[0] - 1) for c in range(grid[1] - 1)]
+    return {frozenset((int(a), int(b))) for quad in quads for a in quad for b in quad if a != b}
+
+
+@pytest.mark.parametrize("grid", [(2, 2), (2, 5), (4, 3), (6, 7)])
+def test_every_quad_has_its_hull_and_both_diagonals_once(grid: tuple[int, int]) -> None:
+    a, b, rest, k_s = chord_springs(Sheet(flat_grid(grid)), 3.0).pairs()
+    pairs = [frozenset((int(i), int(j))) for i, j in zip(a, b, strict=True)]
+    assert len(pairs) == len(set(pairs))
+    assert set(pairs) == joined(grid)
+    assert (rest > 0).all()
+    assert (k_s == 3.0).all()
+
+
+def test_rest_lengths_are_the_chords_of_the_scan() -> None:
+    vertices = flat_grid() + np.random.default_rng(1).normal(0, 1, (9, 11, 3))
+    a, b, rest, _ = chord_springs(Sheet(vertices), 1.0).pairs()
+    points = vertices.reshape(-1, 3)
+    np.testing.assert_allclose(rest, np.linalg.norm(points[a] - points[b], axis=1), rtol=1e-14)
+
+
+def test_stiffness_of_a_quad_reaches_only_its_own_springs() -> None:
+    stiffness = np.ones((8, 10))
+    stiffness[3, 4] = 9.0
+    a, b, _, k_s = chord_springs(Sheet(flat_grid(), stiffness=stiffness), 100.0).pairs()
+    index = np.arange(99).reshape(9, 11)
+    corners = set(index[3:5, 4:6].ravel().tolist())
+    changed = {frozenset((int(i), int(j))) for i, j, k in zip(a, b, k_s, strict=True) if k != 1.0}
+    assert changed == {frozenset((i, j)) for i in corners for j in corners if i != j}
+    assert sorted(k_s[k_s != 1.0].tolist()) == [5.0, 5.0, 5.0, 5.0, 9.0, 9.0]
+
+
+def test_springs_on_the_border_take_their_only_quads_stiffness() -> None:
+    stiffness = np.full((8, 10), 2.0)
+    assert set(chord_springs(Sheet(flat_grid(), stiffness=stiffness), 1.0).pairs()[3].tolist()) == {2.0}
+
+
+def test_coincident_neighbours_are_refused() -> None:
+    vertices = flat_grid()
+    vertices[2, 3] = vertices[3, 4]
+    with pytest.raises(InputError, match=r"`vertices` must be distinct .* got 1 coincident pairs"):
+        chord_springs(Sheet(vertices), 1.0)
+
+
+def test_triangle_mesh_is_refused() -> None:
+    mesh = Sheet(np.eye(3), faces=np.array([[0, 1, 2]]))
+    with pytest.raises(InputError, match=r"`sheet` must be an \(R, C, 3\) grid"):
+        chord_springs(mesh, 1.0)

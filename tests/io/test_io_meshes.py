@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from deskew.errors import InputError
+from deskew.io import Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
+from deskew.types import Sheet
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+@pytest.fixture
+def shuffled() -> Mesh:
+    """Vertices that no face uses, faces in no order, textures that do not follow the vertices."""
+    rng = np.random.default_rng(9)
+    vertices, texture = rng.normal(size=(40, 3)), rng.normal(size=(40, 2))
+    faces = np.array([rng.permutation(36)[:3] for _ in range(25)])
+    return Mesh(vertices, faces, texture)
+
+
+def obj(mesh: Mesh, order: np.ndarray) -> str:
+    """Write with the texture lines in another order than the vertices, every vertex named by some face."""
+    assert mesh.texture is not None
+    place = np.argsort(order)
+    lines = ["# a comment", "mtllib ../../etc/passwd", "o page"]
+    lines += ["v " + " ".join(map(repr, row.tolist())) for row in mesh.vertices]
+    lines += ["vt " + " ".join(map(repr, row.tolist())) for row in mesh.texture[order]]
+    lines += ["vn 0 0 1", "usemtl paper", "s off"]
+    lines += ["f " + " ".join(f"{v + 1}/{place[v] + 1}/1" for v in face) for face in mesh.faces]
+    return "\n".join(lines)
+
+
+def test_obj_vertices_and_their_textures_keep_the_files_order(tmp_path: Path, shuffled: Mesh) -> None:
+    every = np.concatenate([shuffled.faces, np.arange(39).reshape(-1, 3), [[37, 38, 39]]])
+    mesh = Mesh(shuffled.vertices, every, shuffled.texture)
+    (tmp_path / "a.obj").write_text(obj(mesh, np.random.default_rng(1).permutation(40)))
+    found = read_mesh(tmp_path / "a.obj")
+    assert found.vertices.tobytes() == mesh.vertices.tobytes()
+    assert np.array_equal(found.faces, mesh.faces)
+    assert found.texture is not None
+    assert found.texture.tobytes() == mesh.texture.tobytes()  # type: ignore[union-attr]
+
+
+def test_vertices_that_no_face_uses_stay(tmp_path: Path, shuffled: Mesh) -> None:
+    bare = Mesh(shuffled.vertices, shuffled.faces)
+    lines = ["v " + " ".join(map(repr, row.tolist())) for row in bare.vertices]
+    lines += ["f " + " ".join(str(v + 1) for v in face) for face in bare.faces]
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    write_mesh(bare, tmp_path / "a.ply")
+    for name in ("a.obj", "a.ply"):
+        found = read_mesh(tmp_path / name)
+        assert np.array_equal(found.faces, bare.faces)
+        assert np.allclose(found.vertices, bare.vertices, rtol=1e-6, atol=0)
+        assert found.texture is None
+
+
+def test_a_ply_keeps_order_and_textures(tmp_path: Path, shuffled: Mesh) -> None:
+    write_mesh(shuffled, tmp_path / "a.ply")
+    found = read_mesh(tmp_path / "a.ply")
+    assert np.array_equal(found.vertices, shuffled.vertices.astype(np.float32))
+    assert np.array_equal(found.faces, shuffled.faces)
+    assert found.texture is not None
+    used = np.unique(shuffled.faces)
+    assert np.array_equal(found.texture[used], shuffled.texture[used])  # type: ignore[index]
+
+
+def test_negative_indices_and_polygons_are_read(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(SQUARE + "f -4 -3 -2 -1\n")
+    assert read_mesh(tmp_path / "a.obj").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (3, 5), (45, 45)])
+def test_a_grids_triangles_cover_it_once_facing_the_camera(shape: tuple[int, int]) -> None:
+    n_rows, n_columns = shape
+    x, y = np.meshgrid(np.arange(n_columns), -np.arange(n_rows))
+    grid = np.stack([x, y, 0 * x], axis=-1).astype(float)  # columns along +X, rows along -Y, as a page lies
+    mesh = sheet_mesh(Sheet(grid), grid[..., :2])
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    assert np.array_equal(normals, np.tile([0.0, 0.0, 1.0], (2 * (n_rows - 1) * (n_columns - 1), 1)))
+    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    n_edges = len(np.unique(edges, axis=0))
+    assert len(mesh.vertices) - n_edges + len(mesh.faces) == 1  # Euler's characteristic of a disc
+
+
+def test_a_grid_of_one_row_is_refused() -> None:
+    with pytest.raises(InputError, match="`grid` must have at least 2 x 2 vertices, got 1 x 5"):
+        grid_faces(1, 5)
+
+
+WRONG_OBJ = {
+    "empty": ("", "`mesh` must have faces, got none"),
+    "no faces": (SQUARE, "`mesh` must have faces, got none"),
+    "binary": ("\udcff\udcfe", "must be a valid mesh"),
+    "two coordinates": ("v 1 2\nf 1 1 1", "`a line `v`` must hold 3 numbers"),
+    "words for numbers": ("v a b c\nf 1 1 1", "must be a valid mesh, got .*could not convert"),
+    "NaN": (SQUARE.replace("1 1 0", "nan 1 0") + "f 1 2 3", "`vertices` must be finite"),
+    "infinite": (SQUARE.replace("1 1 0", "1e999 1 0") + "f 1 2 3", "`vertices` must be finite"),
+    "index beyond": (SQUARE + "f 1 2 9", r"`index` must be in \[1, 4\], got 9"),
+    "index zero": (SQUARE + "f 0 1 2", r"`index` must be in \[1, 4\], got 0"),
+    "index before": (SQUARE + "f -5 1 2", r"`index` must be in \[1, 4\], got -5"),
+    "index a fraction": (SQUARE + "f 1.5 2 3", "must be a valid mesh"),
+    "face of two": (SQUARE + "f 1 2", "must name 3 or more vertices"),
+    "texture of one number": (SQUARE + "vt 1\nf 1/1 2/1 3/1", "must hold 2 numbers"),
+    "texture beyond": (SQUARE + "vt 1 1\nf 1/1 2/2 3/1", r"`index` must be in \[1, 1\], got 2"),
+    "texture NaN": (SQUARE + "vt nan 1\nf 1/1 2/1 3/1 4/1", "`texture` must be finite"),
+    "texture seam": (SQUARE + "vt 0 0\nvt 1 1\nf 1/1 2/1 3/1 4/1\nf 1/2 2/1 3/1", "`vertex 1` must have one texture"),
+    "texture for some": (SQUARE + "vt 0 0\nf 1/1 2/1 3/1", "`every vertex` must have a texture coordinate, got 3"),
+}
+PLY = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+FACE = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+WRONG_PLY = {
+    "empty": "",
+    "cut in its header": PLY,
+    "cut in its data": PLY + FACE + "0 0 0\n1 0",
+    "index beyond": PLY + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n",
+    "index negative": PLY + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",
+    "NaN": PLY + FACE + "0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n",
+    "no faces": PLY + "end_header\n0 0 0\n1 0 0\n0 1 0\n",
+    "a billion vertices": PLY.replace("vertex 3", "vertex 1000000000").replace("ascii", "binary_little_endian") + FACE,
+}
+
+
+@pytest.mark.parametrize("case", list(WRONG_OBJ))
+def test_a_wrong_obj_is_refused(tmp_path: Path, case: str) -> None:
+    text, message = WRONG_OBJ[case]
+    (tmp_path / "a.obj").write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(InputError, match=rf"a\.obj`.*{message}"):
+        read_mesh(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("case", list(WRONG_PLY))
+def test_a_wrong_ply_is_refused(tmp_path: Path, case: str) -> None:
+    (tmp_path / "a.ply").write_text(WRONG_PLY[case])
+    with pytest.raises(InputError, match=r"a\.ply`.* must "):
+        read_mesh(tmp_path / "a.ply")
+
+
+def test_other_formats_are_refused(tmp_path: Path, shuffled: Mesh) -> None:
+    with pytest.raises(InputError, match=r"must end in \.obj or \.ply, got \.stl"):
+        read_mesh(tmp_path / "a.stl")
+    with pytest.raises(InputError, match=r"must end in \.ply, got \.stl"):
+        write_mesh(shuffled, tmp_path / "a.stl")
+    assert list(tmp_path.iterdir()) == []
