@@ -58,6 +58,29 @@ def _curve(frame: Array, level: Floats, half: int, index: Array, profiles: Array
 
 
 @numba.njit(cache=True)
+def _neighbours(position: Floats, state: Array, where: Floats, which: Array) -> int:
+    """Write one image line's curves in the order of their places to `where` and `which`; return their number.
+
+    A curve that agrees with neither neighbour while these agree with each other is a frame's noise, and left out.
+    """
+    n = 0
+    for k in range(len(position)):
+        if state[k] != _WEAK:
+            where[n], which[n] = position[k], k
+            n += 1
+    order = np.argsort(where[:n])
+    places, frames = where[:n][order], which[:n][order]
+    kept = 0
+    for i in range(n):
+        before, here, after = frames[max(i - 1, 0)], frames[i], frames[min(i + 1, n - 1)]
+        if abs(after - before) <= _JUMP_LINES < min(abs(here - before), abs(here - after)):
+            continue
+        where[kept], which[kept] = places[i], frames[i]
+        kept += 1
+    return kept
+
+
+@numba.njit(cache=True)
 def _fill(
     position: Floats, state: Array, n_frames: int, max_gap: float, integer: bool, out: Floats, reason: Array
 ) -> None:
@@ -69,13 +92,7 @@ def _fill(
     where = np.empty(n_frames)
     which = np.empty(n_frames, np.int64)
     for y in range(n_lines):
-        n = 0
-        for k in range(n_frames):
-            if state[k, y] != _WEAK:
-                where[n], which[n] = position[k, y], k
-                n += 1
-        order = np.argsort(where[:n])
-        where[:n], which[:n] = where[:n][order], which[:n][order]
+        n = _neighbours(position[:, y], state[:, y], where, which)
         for i in range(n - 1):
             gap = where[i + 1] - where[i]
             if gap > max_gap:

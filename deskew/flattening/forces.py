@@ -65,7 +65,7 @@ def scratch() -> Array:
     return np.zeros((12, CHUNK))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _pull(x, v, k_s, rest, beta, inverse_mass, tail, head, start, stop, pulls, slot):  # type: ignore[no-untyped-def]
     """Write what springs start..stop do to their tails into pulls[slot : slot + 3] (eq. 1, over the mass)."""
     for j in range(uintp(stop - start)):
@@ -86,7 +86,7 @@ def _pull(x, v, k_s, rest, beta, inverse_mass, tail, head, start, stop, pulls, s
         pulls[slot + 2, j] = scale * dz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: ignore[no-untyped-def]
     """Add a chunk's pulls to its tails and subtract them from its heads (eq. 2)."""
     for axis in range(3):

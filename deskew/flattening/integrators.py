@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, uintp
 
 from deskew.flattening.contact import GOOD_STEPS, collide, sunk
 from deskew.flattening.forces import accelerate, scratch
@@ -99,12 +99,19 @@ def start(vertices: Array, scheme: Scheme, dt: float) -> Run:
 
 
 @njit(cache=True, error_model="numpy")
-def _add(rows, weight, terms):  # type: ignore[no-untyped-def]
-    """Add weight * terms to rows, both (3, V)."""
-    if weight != 0.0:
-        for axis in range(3):
-            for i in range(rows.shape[1]):
-                rows[axis, i] += weight * terms[axis, i]
+def _sum(rows, weight, terms, out):  # type: ignore[no-untyped-def]
+    """Write rows + weight * terms into out, all (3, V); out may be rows itself."""
+    for axis in range(3):
+        for i in range(uintp(rows.shape[1])):
+            out[axis, i] = rows[axis, i] + weight * terms[axis, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _copy(rows, out):  # type: ignore[no-untyped-def]
+    """Copy rows into out, both (3, V); a slice assignment takes seconds longer to compile."""
+    for axis in range(3):
+        for i in range(uintp(rows.shape[1])):
+            out[axis, i] = rows[axis, i]
 
 
 @njit(cache=True, error_model="numpy")
@@ -114,12 +121,13 @@ def _stages(run, scheme, physics, h, first):  # type: ignore[no-untyped-def]
         X, V = run.x, run.v
         if i > 0:
             X, V = run.stage[0], run.stage[1]
-            X[:] = run.x
-            V[:] = run.v
-            _add(X, scheme.c[i] * h, run.v)
+            _sum(run.x, scheme.c[i] * h, run.v, X)
+            _sum(run.v, scheme.A_v[i, 0] * h, run.accelerations[0], V)
             for j in range(i):
-                _add(X, scheme.A_x[i, j] * h * h, run.accelerations[j])
-                _add(V, scheme.A_v[i, j] * h, run.accelerations[j])
+                if scheme.A_x[i, j] != 0.0:
+                    _sum(X, scheme.A_x[i, j] * h * h, run.accelerations[j], X)
+                if scheme.A_v[i, j] != 0.0 and j > 0:
+                    _sum(V, scheme.A_v[i, j] * h, run.accelerations[j], V)
         accelerate(X, V, physics, run.work, run.accelerations[i])
         run.counts[EVALUATIONS] += 1
 
@@ -155,10 +163,10 @@ def advance(run, scheme, physics, plane, dt_max, dt_min, n_steps):  # type: igno
         h = run.clock[0]
         _stages(run, scheme, physics, h, first)
         first = 1  # stage 0 does not depend on the step: a rejected one does not void it
-        X[:] = run.x
-        _add(X, h, run.v)
+        _sum(run.x, h, run.v, X)
         for j in range(scheme.c.shape[0]):
-            _add(X, scheme.b_x[j] * h * h, run.accelerations[j])
+            if scheme.b_x[j] != 0.0:
+                _sum(X, scheme.b_x[j] * h * h, run.accelerations[j], X)
         if sunk(X[2], plane) > 0:
             if h > dt_min:
                 run.clock[0] = h / 2
@@ -167,9 +175,9 @@ def advance(run, scheme, physics, plane, dt_max, dt_min, n_steps):  # type: igno
                 continue
             if plane.literal:
                 return False
-        run.x[:] = X
+        _copy(X, run.x)
         for j in range(scheme.c.shape[0]):
-            _add(run.v, scheme.b_v[j] * h, run.accelerations[j])
+            _sum(run.v, scheme.b_v[j] * h, run.accelerations[j], run.v)
         run.counts[CONTACTS] += collide(run.x[2], run.v[2], plane, physics.gravity, h)
         first = 0
         run.counts[STEPS] += 1

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from deskew.io.files import write_bytes
-from experiments.reporting.figures import dot_plot, png_bytes
+from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.layout import Layout
 from experiments.reporting.tables import table
 from experiments.trials.schema import Failure, Row
@@ -43,7 +43,14 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
         figure = dot_plot(plot, results.rows)
         if figure is not None:
             files[f"figures/{plot.name}.png"] = png_bytes(figure)
-    files |= {f"figures/{name}.png": png for name, png in results.pictures.items()}
+    shown = set()
+    for montage in layout.montages:
+        wall = picture_wall(montage, results.pictures)
+        if wall is not None:
+            files[f"figures/{montage.name}.png"] = png_bytes(wall)
+        shown |= {name.format(trial=row.trial) for _, name in montage.lines for row in results.rows}
+    alone = {name: png for name, png in results.pictures.items() if name not in shown}
+    files |= {f"figures/{name}.png": png for name, png in alone.items()}
     for name, content in files.items():
         (out / name).parent.mkdir(parents=True, exist_ok=True)
         write_bytes(content, out / name)

@@ -1,16 +1,19 @@
-"""Rows to pictures: a dot a trial, so that nobody mistakes a mean for the data."""
+"""Rows and pictures to figures: a dot a trial, so that nobody mistakes a mean for the data."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from statistics import median
 
+import cv2
+import numpy as np
+import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from experiments.reporting.layout import Plot
+from experiments.reporting.layout import Montage, Plot
 from experiments.trials.schema import Row
 
 
@@ -46,3 +49,34 @@ def dot_plot(plot: Plot, rows: Sequence[Row]) -> Figure | None:
     axes.set_xlabel(plot.label)
     axes.grid(axis="x", alpha=0.3)
     return figure
+
+
+def picture_wall(montage: Montage, pictures: Mapping[str, bytes], n_trials_max: int = 5) -> Figure | None:
+    """Draw a montage of recorded pictures (PNG bytes by name), a column a trial; None without any."""
+    trials = [
+        trial for trial in range(n_trials_max) if any(name.format(trial=trial) in pictures for _, name in montage.lines)
+    ]
+    if not trials:
+        return None
+    size = (2.6 * len(trials), 2.0 * len(montage.lines))
+    figure = Figure(figsize=size, layout="constrained")
+    places = figure.subplots(len(montage.lines), len(trials), squeeze=False)
+    for line, (heading, name) in enumerate(montage.lines):
+        for column, trial in enumerate(trials):
+            axes = places[line, column]
+            axes.set(xticks=[], yticks=[])
+            for spine in axes.spines.values():
+                spine.set_visible(False)
+            png = pictures.get(name.format(trial=trial))
+            if png is not None:
+                axes.imshow(_decoded(png), cmap="gray", vmin=0, vmax=255, interpolation="antialiased")
+            if column == 0:
+                axes.set_ylabel(heading, fontsize=9)
+            if line == 0:
+                axes.set_title(f"page {trial + 1}", fontsize=9)
+    return figure
+
+
+def _decoded(png: bytes) -> npt.NDArray[np.uint8]:
+    image = np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED), np.uint8)
+    return image if image.ndim == 2 else image[..., 2::-1]

@@ -20,12 +20,15 @@ class Column:
         Decimals shown.
     paper : mapping of condition to text
         The paper's figure beside ours; a condition also stands for those that go on with "/".
+    headline : bool
+        Whether the summary at the head of the table shows it.
     """
 
     metric: str
     heading: str
     digits: int = 3
     paper: Mapping[str, str] = field(default_factory=dict)
+    headline: bool = False
 
     def paper_figure(self, condition: str) -> str:
         """Return the paper's figure for a condition, "" where it has none."""
@@ -53,6 +56,22 @@ class Plot:
 
 
 @dataclass(frozen=True, slots=True)
+class Montage:
+    """A figure of pictures: a column a trial, a line a kind of picture, as in the paper's figure 3.
+
+    Attributes
+    ----------
+    name : str
+        Written as `figures/NAME.png`.
+    lines : tuple of (heading, picture)
+        The trial's number stands for "{trial}" in the picture's name.
+    """
+
+    name: str
+    lines: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Layout:
     """Table and figures of one study.
 
@@ -64,9 +83,12 @@ class Layout:
         The metrics, left to right; the table of single trials shows these in the paper's manner, a line a trial.
     plots : tuple of Plot
         The figures.
+    montages : tuple of Montage
+        Figures of pictures; a picture in one of them is not written by itself.
     """
 
     title: str
     note: str
     columns: tuple[Column, ...]
     plots: tuple[Plot, ...] = ()
+    montages: tuple[Montage, ...] = ()

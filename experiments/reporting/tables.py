@@ -1,4 +1,4 @@
-"""Rows to `table.md`: each trial in the paper's manner, then all of them with their spread."""
+"""Rows to `table.md`: a summary, each trial in the paper's manner, then all of them with their spread."""
 
 from __future__ import annotations
 
@@ -35,6 +35,8 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure]) -> s
         Each is listed with its reason.
     """
     parts = [f"# {layout.title}", layout.note]
+    if any(column.headline for column in layout.columns):
+        parts += ["## Summary", "Mean over the trials, with its 95 % bootstrap interval.", _headlines(layout, rows)]
     if len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
         parts += ["## Each trial", _each_trial(layout, rows)]
     parts += ["## All trials", _all_trials(layout, rows)]
@@ -63,12 +65,40 @@ def _cell(found: dict[str, float], column: Column) -> str:
     return "failed" if "failed" in found else _NONE
 
 
-def _all_trials(layout: Layout, rows: Sequence[Row]) -> str:
+def _by_place(rows: Sequence[Row]) -> dict[Place, dict[str, list[float]]]:
     values: dict[Place, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for row in rows:
         values[row.condition, row.method][row.metric].append(row.value)
+    return dict(sorted(values.items()))
+
+
+def _headlines(layout: Layout, rows: Sequence[Row]) -> str:
+    """Return a line a condition and method, a column a headline metric, the paper's figures below."""
+    columns = [column for column in layout.columns if column.headline]
     lines = []
-    for (condition, method), metrics in sorted(values.items()):
+    for (condition, method), metrics in _by_place(rows).items():
+        if not any(column.metric in metrics for column in columns) and "failed" not in metrics:
+            continue
+        counts = [len(metrics[column.metric]) for column in columns if column.metric in metrics]
+        cells = [_mean(metrics.get(column.metric, ()), column.digits) for column in columns]
+        lines.append([condition, method, str(max(counts, default=0)), str(len(metrics.get("failed", ()))), *cells])
+    paper = [next(iter(column.paper.values()), _NONE) for column in columns]
+    if set(paper) != {_NONE}:
+        lines.append(["the paper", _NONE, _NONE, _NONE, *paper])
+    return markdown_table(("condition", "method", "n", "failed", *(column.heading for column in columns)), lines)
+
+
+def _mean(values: Sequence[float], digits: int) -> str:
+    if not values:
+        return _NONE
+    found = summarise(values)
+    interval = "" if found.interval is None else f" ({found.interval[0]:.{digits}f}..{found.interval[1]:.{digits}f})"
+    return f"{found.mean:.{digits}f}{interval}"
+
+
+def _all_trials(layout: Layout, rows: Sequence[Row]) -> str:
+    lines = []
+    for (condition, method), metrics in _by_place(rows).items():
         n_failed = len(metrics.get("failed", ()))
         named = [column for column in layout.columns if column.metric in metrics]
         lines += [

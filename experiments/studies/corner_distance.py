@@ -12,16 +12,17 @@ from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import metrics, pipeline, restoration
 from deskew.errors import InputError, require
 from deskew.types import Array, Capture, Floats, Pinhole, Scan, Status
-from experiments.reporting import Column, Layout, Plot
+from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.methods import require_methods
+from experiments.studies.model_view import model_view
 from experiments.studies.study import Study
 from experiments.studies.views import DETECTORS, restored_corners, seen_corners
 from experiments.trials import Outcome, Recorder, TrialKey
 
-_PAPER = {"restored": "< 0.5"}
-_PAPER_MM = {"restored": "< 0.25"}
+_PAPER_PX, _PAPER_MM = 0.5, 0.25
+_N_SHOWN = 5
 
 
 class CornerDistance(Study):
@@ -43,19 +44,21 @@ class CornerDistance(Study):
         "Experiment I: pixel distance (section 4.1, figure 3)",
         "Distance between the corners of the restored image and those of the control image, after an affine alignment "
         "as in the paper; rigid and dense figures, which no wrong scale can flatter, beside it. "
-        "The paper gives its result in words: within half a pixel and within 0.25 mm.",
+        "The paper gives its result in words, within half a pixel and within 0.25 mm: `within the paper's` is the "
+        "share of pages whose mean keeps both.",
         (
-            Column("corner_mean_px", "mean [px]", 3, _PAPER),
-            Column("corner_max_px", "max [px]", 3),
-            Column("corner_mean_mm", "mean [mm]", 3, _PAPER_MM),
+            Column("corner_mean_px", "mean [px]", 3, {"restored": f"< {_PAPER_PX}"}, headline=True),
+            Column("corner_max_px", "max [px]", 3, headline=True),
+            Column("corner_mean_mm", "mean [mm]", 3, {"restored": f"< {_PAPER_MM}"}, headline=True),
             Column("corner_max_mm", "max [mm]", 3),
-            Column("corner_rigid_mean_mm", "rigid mean [mm]", 3),
+            Column("meets_paper", "within the paper's", 2, headline=True),
+            Column("corner_rigid_mean_mm", "rigid mean [mm]", 3, headline=True),
             Column("corner_rigid_max_mm", "rigid max [mm]", 3),
-            Column("dense_mean_mm", "dense mean [mm]", 3),
-            Column("page_coverage", "coverage", 4),
-            Column("corners_missing", "missing", 0),
+            Column("dense_mean_mm", "dense mean [mm]", 3, headline=True),
+            Column("page_coverage", "coverage", 4, headline=True),
+            Column("corners_missing", "missing", 0, headline=True),
             Column("corners_expected", "expected", 0),
-            Column("at_rest", "at rest", 0),
+            Column("at_rest", "at rest", 2, headline=True),
             Column("folded_quads", "folded quads", 0),
             Column("slope_p90_deg", "p90 slope [deg]", 1),
             Column("relief_mm", "relief [mm]", 1),
@@ -63,9 +66,20 @@ class CornerDistance(Study):
             Column("depth_coverage", "depth coverage", 4),
         ),
         (
-            Plot("corner_mean_px", "corner_mean_px", "mean corner distance, affine-aligned [px]", 0.5),
-            Plot("corner_mean_mm", "corner_mean_mm", "mean corner distance, affine-aligned [mm]", 0.25),
+            Plot("corner_mean_px", "corner_mean_px", "mean corner distance, affine-aligned [px]", _PAPER_PX),
+            Plot("corner_mean_mm", "corner_mean_mm", "mean corner distance, affine-aligned [mm]", _PAPER_MM),
             Plot("dense_mean_mm", "dense_mean_mm", "mean distance of all restored pixels, rigidly aligned [mm]"),
+        ),
+        (
+            Montage(
+                "pages",
+                (
+                    ("crumpled", "page_{trial}_crumpled"),
+                    ("3D model", "page_{trial}_model"),
+                    ("restored", "page_{trial}_restored"),
+                    ("control", "page_{trial}_control"),
+                ),
+            ),
         ),
     )
 
@@ -95,7 +109,7 @@ class CornerDistance(Study):
         # The sweeps are rendered while they are decoded: this stage holds both.
         with record.stage("scan"):
             scan = pipeline.scan(capture, bench.calibration, shape=(config.mesh.rows, config.mesh.columns))
-        trial = _Trial(record, bench, page, truth, scan)
+        trial = _Trial(record, bench, page, truth, scan, config.methods[0])
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)
         for method in config.methods:
@@ -107,7 +121,10 @@ class CornerDistance(Study):
 class _Trial:
     """One sheet's pictures and what is measured on them."""
 
-    def __init__(self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth, scan: Scan) -> None:
+    def __init__(
+        self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth, scan: Scan, shown_method: str
+    ) -> None:
+        self.shown_method = shown_method
         self.record, self.bench, self.page, self.truth, self.scan = record, bench, page, truth, scan
         self.camera = bench.calibration.camera
         self.view: Pinhole = restoration.view_camera(self.camera)
@@ -123,6 +140,7 @@ class _Trial:
             found = metrics.corner_distance(self.control[name], true, self.view)
             self.record.add(f"control{name}", "-", found)
         self._picture("control", image)
+        self._picture("model", model_view(self.scan.sheet.vertices))
 
     def measure_unrestored(self, capture: Capture, sheet: TrueSheet) -> None:
         """Measure the crumpled page as it is, the scan and the calibration."""
@@ -134,7 +152,7 @@ class _Trial:
         self.record.add("unrestored", "-", self.bench.residuals())
         shape = {"slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm}
         self.record.add("unrestored", "-", shape)
-        self._picture("unrestored", image)
+        self._picture("crumpled", image)
 
     def measure_restored(self, method: str) -> None:
         """Restore by one method and measure the result, whether it came to rest or not."""
@@ -147,18 +165,20 @@ class _Trial:
             figures["at_rest"] = float(restored.flattened.status is Status.AT_REST)
         self.record.add("restored", method, figures)
         self._compare("restored", method, restored.image, restored_corners(uv, self.corners_mm))
-        self._picture(f"restored_{method}", restored.image)
+        if method == self.shown_method:
+            self._picture("restored", restored.image)
 
     def _compare(self, condition: str, method: str, image: Array, seeds: Floats) -> None:
         for name, detect in DETECTORS.items():
             found = detect(image, seeds)
             distance = metrics.corner_distance(found, self.control[name], self.view)
-            self.record.add(f"{condition}{name}", method, distance)
+            kept = distance["corner_mean_px"] <= _PAPER_PX and distance["corner_mean_mm"] <= _PAPER_MM
+            self.record.add(f"{condition}{name}", method, distance | {"meets_paper": float(kept)})
 
     def _picture(self, name: str, image: Array) -> None:
-        # One page is shown, not all: the reports are committed.
-        if self.record.key.trial == 0:
-            self.record.picture(f"page_{name}", image)
+        # As many pages as the paper shows: the reports are committed.
+        if self.record.key.trial < _N_SHOWN:
+            self.record.picture(f"page_{self.record.key.trial}_{name}", image)
 
 
 def _sheet(config: Config, key: TrialKey, rng: np.random.Generator) -> TrueSheet:

@@ -28,6 +28,8 @@ N_BOARDS = 5
 _LENGTH_MIN = 400.0
 # Within this distance of a corner depth is averaged by a plane [px]; a square is 60 to 90 px wide.
 _RADIUS_PX = 28
+# Ink is too dark to be decoded: depth is carried over a black square, up to this far from its edge [px].
+_INK_PX = 100.0
 # The gates are meant for millimetres at 800 mm; these boards lean far and stand at 3000 to 3600 units.
 _DEPTH = DepthSettings(z_min_mm=-1500.0, z_max_mm=1500.0, neighbour_mm=6.0, jump_mm=15.0)
 
@@ -124,7 +126,7 @@ def _measure_board(
     outline = acquisition.straight_outline(_border(seen))
     with record.stage("mesh"):
         shape = (config.mesh.rows, config.mesh.columns)
-        scan = pipeline.scan(capture, on_bed, shape=shape, outline=outline, depth=_DEPTH, max_hole_px=60.0)
+        scan = pipeline.scan(capture, on_bed, shape=shape, outline=outline, depth=_DEPTH, max_hole_px=_INK_PX)
     for method in config.methods:
         with record.attempt("restored", method):
             with record.stage("restore", "restored", method):

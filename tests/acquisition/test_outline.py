@@ -145,10 +145,10 @@ def test_sides_are_found_within_a_tenth_of_a_pixel(scene: str, angle_deg: float)
     page = Page(angle_deg=angle_deg)
     white, black = draw(page, **SCENES[scene])
     off = distances_to_truth(page_outline(white, black, CAMERA), page)
-    assert 0 < np.sqrt((off**2).mean()) < 0.05
+    assert 0 < np.sqrt((off**2).mean()) < 0.035
     # A single point may straddle the facet's crease, where the page's level jumps.
     assert np.percentile(off, 99) < 0.1
-    assert off.max() < 0.3
+    assert off.max() < 0.2
 
 
 @pytest.mark.parametrize("scene", SCENES)

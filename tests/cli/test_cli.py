@@ -217,6 +217,17 @@ def test_a_failed_step_is_one_line_and_code_3(
     assert list((here / "out").iterdir()) == []
 
 
+def test_an_error_of_several_lines_is_said_in_one(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*args: Any, **kwargs: Any) -> Scan:
+        raise StepError("Scanning failed:\n  no light\x1b[2J in the picture.")
+
+    monkeypatch.setattr(steps, "scan", fail)
+    wanted = "deskew: Scanning failed: no light?[2J in the picture.\n"
+    assert run("run page -c c.json -o out/r.png", capsys) == (3, "", wanted)
+
+
 WRONG_LINES = {
     "nothing": ("", "Missing command."),
     "unknown command": ("scna page", "No such command 'scna'"),
