@@ -15,7 +15,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from deskew.acquisition.bundle import INTRINSICS, Bundle, Observations, Refined, on_board, refine
-from deskew.acquisition.corners import find_board, luminance
+from deskew.acquisition.corners import find_board
+from deskew.acquisition.grey import grey_levels
 from deskew.errors import StepError, require
 from deskew.types import Board, Calibration, Capture, Correspondence, Floats, Pinhole, Size
 
@@ -76,7 +77,7 @@ def view_board(board: Board, capture: Capture, correspondence: Correspondence, n
     StepError
         If the board is not found or hardly any pixel inside it is decoded.
     """
-    lit = luminance(capture.white) - luminance(capture.black)
+    lit = grey_levels(capture.white).astype(np.float64) - grey_levels(capture.black)
     corners = find_board(lit, board.shape)
     chosen = np.isfinite(correspondence.column) & np.isfinite(correspondence.row) & _inside_white(board, corners, lit)
     y, x = np.nonzero(chosen)

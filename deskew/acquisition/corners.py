@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
+from deskew.acquisition.grey import grey_levels
 from deskew.errors import StepError, require
 from deskew.types import Array, Floats
 
@@ -29,13 +30,6 @@ class Derivatives(NamedTuple):
     yy: Floats
 
 
-def luminance(image: Array) -> Floats:
-    """Grey levels of a grey or BGR image, (height, width) float64."""
-    require(image.ndim in (2, 3), "image", "be (height, width[, 3])", image.shape)
-    grey = image if image.ndim == 2 else image @ np.array([0.114, 0.587, 0.299])
-    return np.asarray(grey, dtype=np.float64)
-
-
 def derivatives(image: Array, sigma_px: float) -> Derivatives:
     """Gaussian derivatives of first and second order.
 
@@ -47,7 +41,7 @@ def derivatives(image: Array, sigma_px: float) -> Derivatives:
         Scale, positive.
     """
     require(sigma_px > 0, "sigma_px", "be positive", sigma_px)
-    grey = luminance(image)
+    grey = grey_levels(image).astype(np.float64)
     orders = ((0, 1), (1, 0), (0, 2), (1, 1), (2, 0))  # (along y, along x)
     return Derivatives(*(ndimage.gaussian_filter(grey, sigma_px, order=order, mode="nearest") for order in orders))
 
@@ -221,7 +215,7 @@ def find_board(image: Array, shape: tuple[int, int]) -> Floats:
     StepError
         If the board is not found, or a corner is lost.
     """
-    grey = luminance(image)
+    grey = grey_levels(image).astype(np.float64)
     scaled = np.clip(255 * grey / max(float(np.percentile(grey, 99.5)), 1e-9), 0, 255).astype(np.uint8)
     flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
     found, corners = cv2.findChessboardCornersSB(scaled, shape, flags=flags)

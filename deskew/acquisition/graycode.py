@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from scipy import ndimage
 
-from deskew.acquisition.corners import luminance
+from deskew.acquisition.grey import grey_levels
 from deskew.errors import require
 from deskew.types import Array, Capture, Correspondence, Floats, Frames, PatternKind, Reason
 
@@ -74,7 +74,7 @@ def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> C
     """
     require(capture.pattern is PatternKind.GRAY_CODE, "capture", "hold a Gray code", capture.pattern)
     settings = settings or GrayCodeSettings()
-    white, black = luminance(capture.white), luminance(capture.black)
+    white, black = (grey_levels(image).astype(np.float64) for image in (capture.white, capture.black))
     columns, noise = _differences(capture.columns, white + black)
     rows, _ = _differences(capture.rows, white + black)
     shadow = white - black < settings.shadow_snr * noise
@@ -103,8 +103,8 @@ def _differences(frames: Frames, both: Floats) -> tuple[Floats, Floats]:
     planes = iter(frames)
     differences, noise = [], []
     for pattern, inverse in zip(planes, planes, strict=True):
-        light, dark = luminance(pattern), luminance(inverse)
-        differences.append((light - dark).astype(np.float32))
+        light, dark = (grey_levels(frame).astype(np.float32) for frame in (pattern, inverse))
+        differences.append(light - dark)
         noise.append(_noise_by_level(light + dark - both, both))
     variance = np.median(noise, axis=0) / 4
     levels = np.linspace(0.0, 1.0, len(variance)) * float(both.max())

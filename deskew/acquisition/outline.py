@@ -10,7 +10,8 @@ import numpy as np
 from scipy import ndimage
 
 from deskew import projection
-from deskew.acquisition.pagemask import Mask, grey, largest_filled, page_mask, require_page_shape
+from deskew.acquisition.grey import grey_levels
+from deskew.acquisition.pagemask import Mask, largest_filled, page_mask, require_page_shape
 from deskew.errors import StepError, require
 from deskew.types import Array, Floats, Pinhole
 
@@ -104,7 +105,7 @@ def page_outline(white: Array, black: Array, camera: Pinhole, mask: Mask | None 
     require(white.shape[:2] == (height, width), "white", f"have the camera's shape {(height, width)}", white.shape)
     if mask is None:
         page = page_mask(white, black)
-        signal = grey(white)
+        signal = grey_levels(white).astype(np.float64)
     else:
         require(mask.shape == (height, width), "mask", f"have the camera's shape {(height, width)}", mask.shape)
         require(bool(mask.any()), "mask", "hold at least one pixel of the page", "an empty mask")

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from deskew.acquisition.grey import grey_levels
 from deskew.errors import StepError, require
 from deskew.types import Array, Floats
 
@@ -27,12 +28,6 @@ AREA_MIN = 0.02
 SOLIDITY_MIN = 0.88
 # Contrast below which there is no page but only the desk's grain, as a share of the white frame's brightest level.
 CONTRAST_MIN = 0.08
-
-
-def grey(image: Array) -> Floats:
-    """Return an image as one float channel: the mean over its channels."""
-    values = np.asarray(image, dtype=np.float64)
-    return np.asarray(values.mean(axis=-1) if values.ndim == 3 else values)
 
 
 def _quadratic_surface(values: Floats, chosen: Mask) -> Floats:
@@ -137,7 +132,7 @@ def page_mask(white: Array, black: Array) -> Mask:
     """
     require(white.ndim in (2, 3) and min(white.shape[:2]) >= 32, "white", "be at least 32 x 32 pixels", white.shape)
     require(black.shape == white.shape, "black", f"have white's shape {white.shape}", black.shape)
-    lit, dark = grey(white), grey(black)
+    lit, dark = (grey_levels(image).astype(np.float64) for image in (white, black))
     mask, contrast, _ = _above_desk(lit)
     needed = CONTRAST_MIN * float(lit.max())
     if contrast < needed or not mask.any():

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from deskew.acquisition.grey import grey_levels
 from deskew.acquisition.peaks import fit_profiles
 from deskew.errors import require
 from deskew.types import Array, Capture, Floats, Frames, Reason
@@ -117,26 +118,10 @@ class Sweep:
     reason: npt.NDArray[np.uint8]
 
 
-def luminance(image: Array, name: str) -> Array:
-    """Grey levels of a grey or colour image, in its own integer type.
-
-    Green counts twice, red and blue once: close to luminance, and the same for RGB and BGR files. A pixel that clips in
-    any channel clips here, or an average would hide it.
-    """
-    require(image.dtype in (np.uint8, np.uint16), name, "be of type uint8 or uint16", image.dtype)
-    if image.ndim == 2:
-        return np.ascontiguousarray(image)
-    require(image.ndim == 3 and image.shape[2] == 3, name, "be (height, width[, 3])", image.shape)
-    first, green, last = (image[..., i].astype(np.uint32) for i in range(3))
-    grey = ((first + 2 * green + last + 2) // 4).astype(image.dtype)
-    top = np.iinfo(image.dtype).max
-    grey[(image == top).any(axis=2)] = top
-    return grey
-
-
 def still_scene(capture: Capture, settings: SweepSettings) -> Scene:
     """Return white and black as grey levels, with the level at which the camera clips."""
-    white, black = luminance(capture.white, "white"), luminance(capture.black, "black")
+    white, black = grey_levels(capture.white, "white"), grey_levels(capture.black, "black")
+    require(white.dtype.kind == "u", "white", "be of type uint8 or uint16", white.dtype)
     require(black.dtype == white.dtype, "black", f"have white's type {white.dtype}", black.dtype)
     return Scene(white, black, settings.saturated_level or int(np.iinfo(white.dtype).max))
 
@@ -145,7 +130,7 @@ def grey_frames(frames: Frames, scene: Scene, name: str) -> Iterator[Array]:
     """Yield each frame once, in order, checked against the still scene and as grey levels."""
     count = 0
     for i, frame in enumerate(frames):
-        grey = luminance(frame, f"{name}[{i}]")
+        grey = grey_levels(frame, f"{name}[{i}]")
         require(grey.shape == scene.white.shape, f"{name}[{i}]", f"have white's shape {scene.white.shape}", grey.shape)
         require(grey.dtype == scene.white.dtype, f"{name}[{i}]", f"have white's type {scene.white.dtype}", grey.dtype)
         count += 1

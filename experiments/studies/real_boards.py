@@ -172,8 +172,9 @@ def _board_on_bed(calibration: Calibration, points: Floats) -> Calibration:
     # Z points towards the camera.
     if normal @ projection.centre(calibration.camera) < offset:
         normal, offset = -normal, -offset
-    along = points[-1] - points[0] if np.isfinite(points[[0, -1]]).all() else known[-1] - known[0]
-    x = np.linalg.norm(along) * np.cross(np.cross(normal, along), normal)
+    grid = points.reshape(BOARD.shape[1], BOARD.shape[0], 3)
+    along = np.nanmean(grid[:, -1] - grid[:, 0], axis=0)
+    x = along - (along @ normal) * normal
     x /= np.linalg.norm(x)
     R = np.stack([x, np.cross(normal, x), normal])
     middle = known.mean(axis=0)
@@ -197,9 +198,6 @@ def _from_above(restored: Restoration, unit_px: float = 1.0) -> Array:
     """Return the flattened board as seen straight from above, `unit_px` pixels a unit: a view that shows any bend."""
     nx, ny = BOARD.shape
     half_x, half_y = (BOARD.square * (n + 1) / 2 for n in (nx, ny))
-    # The diagonal of the inner corners was laid along X.
-    turn = np.arctan2(-(ny - 1), nx - 1)
     x, y = np.meshgrid(np.arange(-half_x, half_x, 1 / unit_px), np.arange(half_y, -half_y, -1 / unit_px))
-    world = np.stack([x * np.cos(turn) + y * np.sin(-turn), y * np.cos(turn) + x * np.sin(turn), 0 * x], axis=-1)
-    pixels = projection.project(restored.camera, world).astype(np.float32)
+    pixels = projection.project(restored.camera, np.stack([x, y, 0 * x], axis=-1)).astype(np.float32)
     return np.asarray(cv2.remap(restored.image, pixels[..., 0], pixels[..., 1], cv2.INTER_LINEAR))
