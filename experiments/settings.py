@@ -135,6 +135,14 @@ class MeshSettings(Checked):
 
 
 @dataclass
+class ScanSettings(Checked):
+    """How a line sweep is read (section 2.3): `spatial`, the paper's, per frame; or `temporal`, per pixel."""
+
+    group: ClassVar[str] = "scan."
+    mode: str = choice("spatial", "spatial", "temporal")
+
+
+@dataclass
 class RealBoardsSettings(Checked):
     """The real captures; they are not part of the project."""
 
@@ -158,6 +166,7 @@ class Config(Checked):
     sheet: SheetSettings = field(default_factory=SheetSettings)
     page: PageSettings = field(default_factory=PageSettings)
     rig: RigSettings = field(default_factory=RigSettings)
+    scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
 

@@ -10,6 +10,7 @@ import numpy as np
 import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import metrics, pipeline, restoration
+from deskew.acquisition import SweepSettings
 from deskew.errors import InputError, require
 from deskew.types import Array, Capture, Floats, Pinhole, Scan, Status
 from experiments.reporting import Column, Layout, Montage, Plot
@@ -108,7 +109,8 @@ class CornerDistance(Study):
             capture, truth = data_synth.render(bench.rig, sheet, page, rng)
         # The sweeps are rendered while they are decoded: this stage holds both.
         with record.stage("scan"):
-            scan = pipeline.scan(capture, bench.calibration, shape=(config.mesh.rows, config.mesh.columns))
+            shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
+            scan = pipeline.scan(capture, bench.calibration, shape=shape, sweep=sweep)
         trial = _Trial(record, bench, page, truth, scan, config.methods[0])
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)

@@ -9,6 +9,7 @@ import numpy as np
 import data_synth
 from data_synth import Blank, Checkerboard, Page
 from deskew import acquisition, metrics, pipeline, restoration
+from deskew.acquisition import SweepSettings
 from experiments.reporting import Column, Layout, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
@@ -41,13 +42,13 @@ class PlaneAccuracy(Study):
         "gives the mean deviation, which is nearly blind to a wrong calibration: the error of held-out lengths stands "
         "beside it.",
         (
-            Column("plane_mean_abs_mm", "mean deviation [mm]", 3, _PAPER),
-            Column("plane_rms_mm", "RMS [mm]", 3),
-            Column("plane_max_mm", "max [mm]", 3),
-            Column("length_error_mm", "error of 300 mm, RMS [mm]", 3),
-            Column("depth_raw_rms_mm", "depth RMS [mm]", 3),
+            Column("plane_mean_abs_mm", "mean deviation [mm]", 3, _PAPER, headline=True),
+            Column("plane_rms_mm", "RMS [mm]", 3, headline=True),
+            Column("plane_max_mm", "max [mm]", 3, headline=True),
+            Column("length_error_mm", "error of 300 mm, RMS [mm]", 3, headline=True),
+            Column("depth_raw_rms_mm", "depth RMS [mm]", 3, headline=True),
             Column("depth_raw_p95_mm", "depth p95 [mm]", 3),
-            Column("depth_coverage", "coverage", 4),
+            Column("depth_coverage", "coverage", 4, headline=True),
             Column("tilt_deg", "tilt [deg]", 1),
             Column("calib_camera_rms_px", "camera RMS [px]", 3),
             Column("calib_projector_rms_px", "projector RMS [px]", 3),
@@ -66,9 +67,10 @@ class PlaneAccuracy(Study):
         # The first lies flat; the others lean to all sides.
         tilt = 0.0 if key.trial == 0 else float(rng.uniform(2.0, 15.0))
         azimuth = float(rng.uniform(0.0, 360.0))
+        sweep = SweepSettings(mode=config.scan.mode)
         for condition, page in (("white", Blank()), ("checkered", Checkerboard())):
             with record.attempt(condition):
-                _measure(record, condition, bench, page, (tilt, azimuth), rng)
+                _measure(record, condition, bench, page, (tilt, azimuth), rng, sweep)
         return record.outcome()
 
 
@@ -79,12 +81,13 @@ def _measure(
     page: Page,
     lean_deg: tuple[float, float],
     rng: np.random.Generator,
+    sweep: SweepSettings,
 ) -> None:
     camera = bench.calibration.camera
     sheet = data_synth.plane(page.page_size_mm, tilt_deg=lean_deg[0], azimuth_deg=lean_deg[1])
     with record.stage("scan", condition):
         capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-        correspondence = pipeline.decode(capture)
+        correspondence = pipeline.decode(capture, sweep=sweep)
     with record.stage("depth", condition):
         depth = acquisition.depth_map(bench.calibration, correspondence)
     # Only the plane itself is fitted: desk beside it is none of it.

@@ -9,22 +9,25 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
 from typing import Protocol
 
 import cv2
 from threadpoolctl import threadpool_limits
 
-from deskew.errors import StepError
 from experiments.trials.record import Outcome, carry_out, failed_outcome
 from experiments.trials.schema import TrialKey
 
 Run = Callable[[TrialKey], Outcome]
+
+_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+# A death may have come from outside, so a trial gets a second worker before it is given up.
+_WORKERS_A_TRIAL = 2
 
 
 class Engine(Protocol):
@@ -59,6 +62,43 @@ class Serial:
             yield key, outcome
 
 
+@dataclass(slots=True, eq=False)
+class _Worker:
+    """A process and the trial that it has in hand.
+
+    It is reached by a pipe alone. `concurrent.futures` would need named semaphores, which a container without /dev/shm
+    does not have, and cannot tell which trial a dead worker was at.
+    """
+
+    process: SpawnProcess
+    connection: Connection
+    key: TrialKey | None = None
+
+    @classmethod
+    def start(cls, run: Run) -> _Worker:
+        # Spawned, not forked: a fork would inherit the driver's threads and its open store.
+        context = multiprocessing.get_context("spawn")
+        here, there = context.Pipe()
+        process = context.Process(target=_serve, args=(there, run), daemon=True)
+        with _environment(dict.fromkeys(_ONE_THREAD, "1")):
+            process.start()
+        # The worker's end must be closed here, or its death would not end the pipe.
+        there.close()
+        return cls(process, here)
+
+    def take(self, key: TrialKey) -> None:
+        self.key = key
+        # A worker that is dead already shows at the next read.
+        with suppress(OSError):
+            self.connection.send(key)
+
+    def stop(self, at_once: bool) -> None:
+        self.connection.close()
+        if at_once:
+            self.process.terminate()
+        self.process.join()
+
+
 @dataclass(frozen=True, slots=True)
 class Processes:
     """A pool of freshly started processes, each with one thread.
@@ -72,21 +112,46 @@ class Processes:
     workers: int | None = None
 
     def run(self, run: Run, keys: Sequence[TrialKey]) -> Iterator[tuple[TrialKey, Outcome]]:
-        """Yield the trials as they finish; those under way when a worker dies run again, each alone."""
-        n_workers = min(self.workers or _n_cores(), len(keys))
-        suspects: list[TrialKey] = []
-        waiting = deque(keys)
-        while waiting:
-            yield from _run_pool(run, waiting, n_workers, suspects)
-        for key in suspects:
-            alone = deque([key])
-            died: list[TrialKey] = []
-            yield from _run_pool(run, alone, 1, died)
-            if died:
-                yield (
-                    key,
-                    failed_outcome(key, "The worker process died under this trial (killed, or out of memory).", True),
-                )
+        """Yield the trials as they finish; one whose worker dies is given to another worker once."""
+        waiting, deaths = deque(keys), Counter[TrialKey]()
+        pool = [_Worker.start(run) for _ in range(min(self.workers or _n_cores(), len(keys)))]
+        finished = False
+        try:
+            for worker in pool:
+                worker.take(waiting.popleft())
+            while busy := [worker for worker in pool if worker.key is not None]:
+                ready = wait([worker.connection for worker in busy])
+                for worker in (worker for worker in busy if worker.connection in ready):
+                    key, outcome = _answer(worker)
+                    if outcome is None:
+                        deaths[key] += 1
+                        worker.stop(at_once=True)
+                        fresh = _Worker.start(run)
+                        pool[pool.index(worker)] = worker = fresh
+                        if deaths[key] < _WORKERS_A_TRIAL:
+                            waiting.append(key)
+                        else:
+                            outcome = failed_outcome(key, "The worker process died (killed, or out of memory).", True)
+                    if waiting:
+                        worker.take(waiting.popleft())
+                    if outcome is not None:
+                        yield key, outcome
+            finished = True
+        finally:
+            for worker in pool:
+                worker.stop(at_once=not finished)
+
+
+def _answer(worker: _Worker) -> tuple[TrialKey, Outcome | None]:
+    """Read what a worker hands back for its trial, None if it died."""
+    key = worker.key
+    assert key is not None
+    worker.key = None
+    try:
+        outcome: Outcome = worker.connection.recv()
+    except (EOFError, OSError):
+        return key, None
+    return key, outcome
 
 
 def _n_cores() -> int:
@@ -94,59 +159,28 @@ def _n_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _run_pool(
-    run: Run, waiting: deque[TrialKey], n_workers: int, died: list[TrialKey]
-) -> Iterator[tuple[TrialKey, Outcome]]:
-    """Take trials from `waiting` until it is empty or a worker dies; those under way then are put into `died`."""
-    running: dict[Future[Outcome], TrialKey] = {}
-    pool = _start_pool(run, n_workers)
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
     try:
-        while waiting or running:
-            # No more in flight than there are workers, so a death leaves few suspects.
-            while waiting and len(running) < n_workers:
-                running[pool.submit(_run_here, waiting[0])] = waiting[0]
-                waiting.popleft()
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                outcome = future.result()
-                yield running.pop(future), outcome
-    except BrokenProcessPool as error:
-        if not running:
-            raise StepError("The worker processes died before they took a trial; try engine=serial.") from error
-        died.extend(running.values())
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _start_pool(run: Run, n_workers: int) -> ProcessPoolExecutor:
-    # Spawned, not forked: a fork would inherit the driver's threads and its open store.
-    context = multiprocessing.get_context("spawn")
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        pool = ProcessPoolExecutor(n_workers, context, _begin_worker, (run,))
-        # Workers start on demand; ask for all of them while the environment holds.
-        wait([pool.submit(os.getpid) for _ in range(n_workers)])
+        yield
     finally:
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-    return pool
 
 
-_run: Run | None = None
-
-
-def _begin_worker(run: Run) -> None:
-    """Take over what all trials share, once a worker."""
-    global _run
-    _run = run
-    cv2.setNumThreads(1)
-    # ctrl-C is the driver's to handle; if the driver is killed, nobody would end this worker but itself.
+def _serve(connection: Connection, run: Run) -> None:
+    """Carry trials out until the driver closes the pipe."""
+    # ctrl-C is the driver's to handle; if the driver is killed, nobody would end a running trial but this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    with one_thread(), suppress(EOFError):
+        while True:
+            connection.send(carry_out(run, connection.recv()))
 
 
 def _end_with_parent() -> None:
@@ -154,9 +188,3 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
-
-
-def _run_here(key: TrialKey) -> Outcome:
-    assert _run is not None
-    with one_thread():
-        return carry_out(_run, key)

@@ -16,7 +16,7 @@ from experiments.studies import AbsentError, Study
 from experiments.trials import Outcome, Recorder, TrialKey
 
 # The sheet's slope is the one number that the tests can set freely: these values ask for trouble.
-ABSENT, STEP_FAILS, TRIAL_1_FAILS, ALL_FAIL, TRIAL_1_KILLS, NAN = 50.0, 51.0, 52.0, 53.0, 54.0, 55.0
+ABSENT, STEP_FAILS, TRIAL_1_FAILS, ALL_FAIL, TRIAL_1_KILLS, NAN, KILLED_ONCE = 50.0, 51.0, 52.0, 53.0, 54.0, 55.0, 56.0
 
 
 class FakeStudy(Study):
@@ -45,6 +45,9 @@ class FakeStudy(Study):
         if slope == ALL_FAIL or (slope == TRIAL_1_FAILS and key.trial == 1):
             raise ValueError("sheet | is\nsteep")
         if slope == TRIAL_1_KILLS and key.trial == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if slope == KILLED_ONCE and key.trial == 1 and not Path("killed").exists():
+            Path("killed").touch()
             os.kill(os.getpid(), signal.SIGKILL)
         record = Recorder(key)
         rng = key.generator()

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.experiments.conftest import Program
-from tests.experiments.fake_study import TRIAL_1_KILLS
+from tests.experiments.fake_study import KILLED_ONCE, TRIAL_1_KILLS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -85,13 +85,24 @@ def test_killed_worker_costs_one_trial_which_the_next_run_tries_again(program: P
     trouble = (f"sheet.slope_p90_deg={TRIAL_1_KILLS}", "engine=processes", "engine.workers=2")
     assert program(*trouble) == 0
     table = (out / "table.md").read_text()
-    assert "| 1 | 1 | - | - | The worker process died under this trial" in table
+    assert "| 1 | 1 | - | - | The worker process died" in table
     rows = (out / "results.csv").read_text().splitlines()[1:]
     assert [line for line in rows if ",failed," in line] == ["fake,-,-,1,1,failed,1.0,1"]
     assert {line.split(",")[3] for line in rows} == {"0", "1", "2", "3"}
     log.write_text("")
     assert program(*trouble) == 0
     assert lines_of(log) == ["prepare"]
+
+
+def test_worker_killed_from_outside_loses_no_row(program: Program, out: Path, log: Path) -> None:
+    trouble = f"sheet.slope_p90_deg={KILLED_ONCE}"
+    assert program(trouble, "engine=processes", "engine.workers=2") == 0
+    assert (log.parent / "killed").exists()
+    survived = (out / "results.csv").read_bytes()
+    assert b"failed" not in survived
+    (out / "results.sqlite").unlink()
+    assert program(trouble) == 0
+    assert (out / "results.csv").read_bytes() == survived
 
 
 DRIVER = """

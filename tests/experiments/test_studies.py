@@ -45,7 +45,7 @@ def test_points_without_a_neighbourhood_are_missing() -> None:
     z = plane_depth(pixel_grid(SIZE))
     z[:, :40] = np.nan
     depth = DepthMap(z, (~np.isfinite(z)).astype(np.uint8), ideal(CAMERA))
-    points = scanned_points(depth, np.array([(10.0, 60.0), (np.nan, 5.0), (100.0, 60.0), (159.0, 0.0)]), 6)
+    points = scanned_points(depth, np.array([(10.0, 60.0), (np.nan, 5.0), (100.0, 60.0), (36.0, 60.0)]), 6)
     assert np.isfinite(points).all(axis=1).tolist() == [False, False, True, False]
 
 
