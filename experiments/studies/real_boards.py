@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,16 +14,18 @@ from deskew import acquisition, io, metrics, pipeline, projection, restoration
 from deskew.acquisition import BoardView, DepthSettings
 from deskew.errors import require
 from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Status
-from experiments.reporting import Column, Layout
+from experiments.reporting import Column, Layout, Montage
 from experiments.settings import Config
 from experiments.studies.methods import require_methods
 from experiments.studies.scanned import scanned_points
 from experiments.studies.study import AbsentError, Study
-from experiments.trials import Outcome, Recorder, TrialKey, trial_keys
+from experiments.trials import Outcome, Recorder, TrialKey, content_digest, trial_keys
 
 # The captures' own README: 9 x 7 inner corners, 75 units a square, five poses.
 BOARD = Board((9, 7), 75.0, "units")
 N_BOARDS = 5
+CAPTURES = "kamino410/procam-calibration at 09e58d5, sample_data"
+CAPTURES_SHA256 = "be29c9292c2df151e1f1b02b169df48c26c58a08e71a2af4751feab7878664e1"
 # Shortest length that counts; the board's inner corners span 600 x 450 units.
 _LENGTH_MIN = 400.0
 # Within this distance of a corner depth is averaged by a plane [px]; a square is 60 to 90 px wide.
@@ -71,6 +73,12 @@ class RealBoards(Study):
             Column("corners_expected", "expected", 0),
             Column("at_rest", "at rest", 0),
         ),
+        montages=(
+            Montage(
+                "boards",
+                (("as the camera sees it", "board_{trial}_seen"), ("restored, from above", "board_{trial}_restored")),
+            ),
+        ),
     )
 
     def plan(self, config: Config) -> list[TrialKey]:
@@ -82,6 +90,8 @@ class RealBoards(Study):
             raise AbsentError("real_boards.path names no folder; README says where the captures are to be had")
         if not Path(path).is_dir():
             raise AbsentError(f"real_boards.path: there is no folder {path}")
+        found = content_digest(sorted(Path(path).glob("capture_*/graycode_*.png")), Path(path))
+        require(found == CAPTURES_SHA256, "real_boards.path", f"hold the frames of {CAPTURES}", f"SHA-256 {found[:12]}")
         return [TrialKey(config.experiment, "calibration", "-", 0, config.seed), *trial_keys(config)]
 
     def inputs(self, config: Config) -> Mapping[str, Path]:
@@ -122,7 +132,11 @@ def _measure_board(
     deviation = acquisition.plane_deviation(points[np.isfinite(points).all(axis=1)])
     figures = {"length_error_units": float(np.sqrt((errors**2).mean())), "plane_mean_abs_units": deviation.mean_abs_mm}
     record.add("left_out", "-", figures)
-    on_bed = _board_on_bed(calibration, points)
+    R, t = _onto_bed(calibration.camera, points)
+    record.add("left_out", "-", _as_rows(R, t))
+    on_bed = replace(
+        calibration, camera=_in_world(calibration.camera, R, t), projector=_in_world(calibration.projector, R, t)
+    )
     outline = acquisition.straight_outline(_border(seen))
     with record.stage("mesh"):
         shape = (config.mesh.rows, config.mesh.columns)
@@ -132,9 +146,10 @@ def _measure_board(
             with record.stage("restore", "restored", method):
                 restored = pipeline.restore(scan, method=method)
             _measure_restored(record, method, restored, seen)
-            name = f"board_{record.key.trial}"
-            record.picture(f"{name}_unrestored", restoration.undistorted_view(capture.white, calibration.camera))
-            record.picture(f"{name}_{method}", _from_above(restored))
+            if method == config.methods[0]:
+                name = f"board_{record.key.trial}"
+                record.picture(f"{name}_seen", restoration.undistorted_view(capture.white, calibration.camera))
+                record.picture(f"{name}_restored", _from_above(restored))
 
 
 def _measure_restored(record: Recorder, method: str, restored: Restoration, seeds: Floats) -> None:
@@ -165,12 +180,12 @@ def _border(corners: Floats) -> Floats:
     return np.asarray(cv2.perspectiveTransform(rim.reshape(-1, 1, 2), homography)).reshape(4, 2)
 
 
-def _board_on_bed(calibration: Calibration, points: Floats) -> Calibration:
-    """Move the world so that the scanned board's best-fit plane is its Z = 0, X along the board's rows."""
+def _onto_bed(camera: Pinhole, points: Floats) -> tuple[Floats, Floats]:
+    """Return the movement ``X' = R X + t`` that lays the board's best-fit plane onto Z = 0, X along its rows."""
     known = points[np.isfinite(points).all(axis=1)]
     normal, offset = acquisition.fit_plane(known)
     # Z points towards the camera.
-    if normal @ projection.centre(calibration.camera) < offset:
+    if normal @ projection.centre(camera) < offset:
         normal, offset = -normal, -offset
     grid = points.reshape(BOARD.shape[1], BOARD.shape[0], 3)
     along = np.nanmean(grid[:, -1] - grid[:, 0], axis=0)
@@ -178,15 +193,14 @@ def _board_on_bed(calibration: Calibration, points: Floats) -> Calibration:
     x /= np.linalg.norm(x)
     R = np.stack([x, np.cross(normal, x), normal])
     middle = known.mean(axis=0)
-    t = -R @ (middle - (middle @ normal - offset) * normal)
-    return Calibration(
-        _in_world(calibration.camera, R, t),
-        _in_world(calibration.projector, R, t),
-        calibration.residuals,
-        calibration.uncertainty,
-        calibration.n_poses,
-        calibration.unit,
-    )
+    return R, -R @ (middle - (middle @ normal - offset) * normal)
+
+
+def _as_rows(R: Floats, t: Floats) -> dict[str, float]:
+    """Name the movement onto the bed: a rotation vector and a translation."""
+    turn = cv2.Rodrigues(R)[0].ravel()
+    named = {f"onto_bed_r{axis}_rad": float(value) for axis, value in zip("xyz", turn, strict=True)}
+    return named | {f"onto_bed_t{axis}_units": float(value) for axis, value in zip("xyz", t, strict=True)}
 
 
 def _in_world(device: Pinhole, R: Floats, t: Floats) -> Pinhole:

@@ -1,7 +1,7 @@
 """Trials: what a row is, which trials a run plans, who carries them out and where finished ones are kept."""
 
 from experiments.trials.engines import Engine, Processes, Serial
-from experiments.trials.plan import fingerprint, settings_of, trial_keys
+from experiments.trials.plan import content_digest, fingerprint, settings_of, trial_keys
 from experiments.trials.record import Outcome, Recorder
 from experiments.trials.schema import Failure, Row, TrialKey, unit_of
 from experiments.trials.store import Store
@@ -16,6 +16,7 @@ __all__ = [
     "Serial",
     "Store",
     "TrialKey",
+    "content_digest",
     "fingerprint",
     "settings_of",
     "trial_keys",

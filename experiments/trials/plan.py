@@ -42,7 +42,7 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
             settings.pop(section)
     settings["method"] = config.methods
     for key, path in inputs.items():
-        settings[f"sha256 of {key}"] = _digest(sorted(path.rglob("*")) if path.is_dir() else [path], path)
+        settings[f"sha256 of {key}"] = content_digest(sorted(path.rglob("*")) if path.is_dir() else [path], path)
     if "real_boards" in settings:
         settings["real_boards"].pop("path")
     settings["sheet"] = {name: value for name, value in settings["sheet"].items() if name != "paths"}
@@ -52,7 +52,7 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
 def fingerprint(settings: Mapping[str, Any]) -> str:
     """Return the SHA-256 of the settings and of the sources that compute a row."""
     files = [path for source in SOURCES for path in _python_files(_ROOT / source)]
-    text = json.dumps(settings, sort_keys=True) + _digest(files, _ROOT)
+    text = json.dumps(settings, sort_keys=True) + content_digest(files, _ROOT)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -60,7 +60,8 @@ def _python_files(source: Path) -> list[Path]:
     return sorted(source.rglob("*.py")) if source.is_dir() else [source]
 
 
-def _digest(files: Iterable[Path], root: Path) -> str:
+def content_digest(files: Iterable[Path], root: Path) -> str:
+    """Return the SHA-256 of files, of their names under `root` and their content; what is no file is passed over."""
     total = hashlib.sha256()
     for path in files:
         if path.is_file():

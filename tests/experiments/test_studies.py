@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from deskew.projection import ideal, pixel_grid, project, rays
-from deskew.types import Calibration, DepthMap, Floats, Pinhole
+from deskew.types import DepthMap, Floats, Pinhole
 from experiments.program import main
 from experiments.studies import STUDIES, find_study
-from experiments.studies.real_boards import _board_on_bed
+from experiments.studies.real_boards import _in_world, _onto_bed
 from experiments.studies.scanned import scanned_points
 from experiments.studies.views import restored_corners
 
@@ -64,14 +64,25 @@ def test_moving_the_world_onto_the_board_changes_no_picture_and_lays_the_board_o
     across = np.linalg.svd(NORMAL[None])[2][1:]
     points = OFFSET * NORMAL + rng.uniform(-80, 80, (63, 2)) @ across
     projector = Pinhole(SIZE, K, np.zeros(5), ROTATION, np.array([-200.0, 0.0, 780.0]))
-    moved = _board_on_bed(Calibration(CAMERA, projector, {}), points)
-    centre = -moved.camera.R.T @ moved.camera.t
-    assert centre[2] > 0
-    for before, after in ((CAMERA, moved.camera), (projector, moved.projector)):
-        # The same points in the new world, by the camera's frame, which has not moved.
-        here = (points @ CAMERA.R.T + CAMERA.t - moved.camera.t) @ moved.camera.R
-        assert np.abs(here[:, 2]).max() < 1e-9
+    R, t = _onto_bed(CAMERA, points)
+    here = points @ R.T + t
+    assert np.abs(here[:, 2]).max() < 1e-9
+    for before in (CAMERA, projector):
+        after = _in_world(before, R, t)
         assert np.abs(project(after, here) - project(before, points)).max() < 1e-9
+    camera = _in_world(CAMERA, R, t)
+    assert -(camera.R.T @ camera.t)[2] > 0
+
+
+def test_real_boards_refuse_other_captures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "capture_0"
+    folder.mkdir()
+    (folder / "graycode_00.png").write_bytes(b"something else")
+    assert main(["experiment=real_boards", f"out={tmp_path / 'out'}", f"real_boards.path={tmp_path}"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("`real_boards.path` must hold the frames of kamino410/procam-calibration at 09e58d5")
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("name", ["corner_distance", "plane_accuracy", "real_boards"])
