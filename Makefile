@@ -27,6 +27,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@.ci/setup "$(PYTHON)"
 
 reproduce: $(EXPERIMENTS) ## run every experiment and regenerate reports/ (BUDGET=smoke|paper|full)
+	@$(if $(filter smoke,$(BUDGET)),true,$(BIN)/python -m experiments.reporting.readme)
 
 # One after another, whatever -j says: each uses all cores by itself.
 .NOTPARALLEL:

@@ -35,7 +35,7 @@ def model_view(vertices: Floats, size: tuple[int, int] = (640, 480)) -> npt.NDAr
     light = LightSource(azdeg=315, altdeg=40)
     axes.plot_surface(x, y, z, rstride=1, cstride=1, color="0.95", lightsource=light, linewidth=0, antialiased=False)
     spans = [float(np.ptp(axis)) for axis in (x, y, z)]
-    axes.set_box_aspect((spans[0], spans[1], 3.0 * max(spans[2], 1.0)))
+    axes.set_box_aspect((spans[0], spans[1], 3.0 * max(spans[2], 1.0)), zoom=1.2)
     axes.view_init(elev=48, azim=-100)
     axes.set_axis_off()
     pixels, _ = canvas.print_to_buffer()
