@@ -9,7 +9,9 @@ import numpy.typing as npt
 
 from deskew import acquisition, flattening, restoration
 from deskew.acquisition import DepthSettings, GrayCodeSettings, Outline, SweepSettings
+from deskew.errors import require
 from deskew.types import (
+    WHITE,
     Board,
     Calibration,
     Capture,
@@ -18,8 +20,6 @@ from deskew.types import (
     Restoration,
     Scan,
 )
-
-WHITE = "white"
 
 
 def decode(
@@ -39,7 +39,13 @@ def decode(
     return acquisition.decode_gray(capture, gray)
 
 
-def calibrate(board: Board, captures: Iterable[Capture]) -> Calibration:
+def calibrate(
+    board: Board,
+    captures: Iterable[Capture],
+    *,
+    sweep: SweepSettings | None = None,
+    gray: GrayCodeSettings | None = None,
+) -> Calibration:
     """Calibrate camera and projector from captures of a printed board (section 2.2).
 
     Parameters
@@ -48,13 +54,15 @@ def calibrate(board: Board, captures: Iterable[Capture]) -> Calibration:
         The printed board.
     captures : iterable of Capture
         One a pose, read one at a time; the first lies on the bed and defines the world.
+    sweep, gray : settings, optional
+        Of the decoder for either kind.
 
     Raises
     ------
     StepError
         If a board is not found, or the poses do not determine the devices.
     """
-    views = [acquisition.view_board(board, capture, decode(capture)) for capture in captures]
+    views = [acquisition.view_board(board, capture, decode(capture, sweep=sweep, gray=gray)) for capture in captures]
     return acquisition.calibrate(board, views)
 
 
@@ -63,6 +71,7 @@ def scan(
     calibration: Calibration,
     *,
     shape: tuple[int, int] = (45, 45),
+    decoded: Correspondence | None = None,
     outline: Outline | None = None,
     mask: npt.NDArray[np.bool_] | None = None,
     sweep: SweepSettings | None = None,
@@ -80,6 +89,8 @@ def scan(
         Of the same devices.
     shape : (rows, columns)
         Vertices of the mesh; the paper's is 45 x 45.
+    decoded : Correspondence, optional
+        The capture, decoded before.
     outline : Outline, optional
         The page's sides; found on the desk in the white and black frames if not given.
     mask : (height, width) bool array, optional
@@ -89,7 +100,8 @@ def scan(
     max_hole_px : float
         Holes in the depth map up to this distance from measured depth are filled for the mesh.
     """
-    depth_map = acquisition.depth_map(calibration, decode(capture, sweep=sweep, gray=gray), depth)
+    decoded = decoded or decode(capture, sweep=sweep, gray=gray)
+    depth_map = acquisition.depth_map(calibration, decoded, depth)
     if outline is None:
         outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask)
     mesh = acquisition.page_mesh(depth_map, outline, shape, max_hole_px=max_hole_px)
@@ -111,5 +123,6 @@ def restore(scan: Scan, *, method: str = "paper_euler", light: str = WHITE, **se
     **settings
         Of the flattening method.
     """
+    require(light in scan.images, "light", f"be one of {', '.join(scan.images)}", light)
     flattened = flattening.flatten(scan.sheet, method=method, **settings)
     return restoration.texture_quads(scan.images[light], scan.camera, scan.sheet, flattened)

@@ -19,6 +19,7 @@ from deskew.errors import require
 Array = npt.NDArray[Any]
 Floats = npt.NDArray[np.floating[Any]]
 Size = tuple[int, int]
+WHITE = "white"  # the light under which every capture is taken
 
 
 def _require_finite(name: str, values: Array, shape: tuple[int, ...]) -> None:
@@ -112,6 +113,7 @@ class Capture:
 
     def __post_init__(self) -> None:
         _require_size("projector_size", self.projector_size)
+        require(WHITE not in self.textures, "textures", "have names of their own", f"one called {WHITE}")
         require(self.white.ndim in (2, 3), "white", "be (height, width[, 3])", self.white.shape)
         require(
             self.black.shape == self.white.shape, "black", f"have white's shape {self.white.shape}", self.black.shape

@@ -18,6 +18,8 @@ from deskew.errors import StepError, require
 from deskew.types import Array, Floats
 
 _LOST = np.full(2, np.nan)
+# A corner's saddle must stand out of the image's noise by this many standard deviations; on a blank page none does.
+SADDLE_SNR = 10.0
 
 
 class Derivatives(NamedTuple):
@@ -58,6 +60,28 @@ def kitchen_rosenfeld(d: Derivatives) -> Floats:
     gradient2 = d.x**2 + d.y**2
     numerator = d.xx * d.y**2 - 2 * d.xy * d.x * d.y + d.yy * d.x**2
     return np.divide(numerator, gradient2, out=np.zeros_like(numerator), where=gradient2 > 1e-12 * gradient2.max())
+
+
+def _saddle_strength(image: Array, d: Derivatives, sigma_px: float) -> Floats:
+    """How far each pixel's saddle stands out of the noise, (height, width) in standard deviations; 0 where it has none.
+
+    ``sqrt(Ixy^2 - Ixx Iyy)`` over the noise of Ixy, which is ``noise / sqrt(16 pi sigma^6)`` for white noise. The noise
+    is Immerkaer's: the median magnitude of a mask that no plane and no straight edge excites.
+    """
+    mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]]) / 6.0
+    response = np.abs(ndimage.convolve(grey_levels(image).astype(np.float64), mask, mode="nearest"))
+    noise = max(float(np.median(response)) / 0.6745, 1 / np.sqrt(12))  # no camera is quieter than its rounding
+    strength = np.sqrt(np.maximum(d.xy**2 - d.xx * d.yy, 0.0))
+    return np.asarray(strength * np.sqrt(16 * np.pi * sigma_px**6) / noise)
+
+
+def _lose_weak(corners: Floats, strength: Floats) -> None:
+    """Set corners to NaN, in place, where `strength` at their pixel is below `SADDLE_SNR`."""
+    found = np.isfinite(corners).all(axis=1)
+    x, y = np.rint(corners[found]).astype(int).T
+    height, width = strength.shape
+    weak = strength[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)] < SADDLE_SNR
+    corners[np.flatnonzero(found)[weak]] = np.nan
 
 
 def _require_seeds(seeds: Floats) -> Floats:
@@ -109,9 +133,11 @@ def refine_kitchen_rosenfeld(
     Returns
     -------
     (N, 2) array
-        Corners [px], NaN where the window left the image or the centroid ran further than `radius_px` from its seed.
+        Corners [px], NaN where the window left the image, the centroid ran further than `radius_px` from its seed, or
+        no saddle stands out of the noise there.
     """
-    response = np.abs(kitchen_rosenfeld(derivatives(image, sigma_px)))
+    d = derivatives(image, sigma_px)
+    response = np.abs(kitchen_rosenfeld(d))
     refined = np.full_like(_require_seeds(seeds), np.nan)
     offsets = np.arange(-radius_px, radius_px + 1, dtype=np.float64)
     for i, seed in enumerate(seeds):
@@ -133,6 +159,7 @@ def refine_kitchen_rosenfeld(
                 break
         if np.isfinite(corner).all() and np.hypot(*(corner - seed)) <= radius_px:
             refined[i] = corner
+    _lose_weak(refined, _saddle_strength(image, d, sigma_px))
     return refined
 
 
@@ -157,10 +184,10 @@ def refine_saddle(
     Returns
     -------
     (N, 2) array
-        Corners [px], NaN where there is no saddle within `search_px` + `sigma_px` of the seed.
+        Corners [px], NaN where no saddle within `search_px` + `sigma_px` of the seed stands out of the noise.
     """
     d = derivatives(image, sigma_px)
-    strength = d.xy**2 - d.xx * d.yy
+    strength = _saddle_strength(image, d, sigma_px)
     start = _strongest(strength, _require_seeds(seeds), search_px)
     splines = [ndimage.spline_filter(channel, order=3, mode="nearest") for channel in d]
     corners = start.copy()
@@ -177,6 +204,7 @@ def refine_saddle(
             break
     strayed = ~(np.hypot(*(corners - seeds).T) <= search_px + sigma_px)
     corners[strayed] = np.nan
+    _lose_weak(corners, strength)
     return corners
 
 

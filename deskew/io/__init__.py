@@ -4,10 +4,11 @@ Every reader takes a path, checks what it finds and raises `deskew.errors.InputE
 takes the thing, then the path, and leaves either the whole file or nothing. Colour images are RGB in memory.
 """
 
+from deskew.io.arrays import read_arrays, write_arrays
 from deskew.io.boards import read_board, read_procam_graycode, write_board
 from deskew.io.calibrations import read_calibration, write_calibration
 from deskew.io.captures import read_capture, write_capture
-from deskew.io.files import require_writable
+from deskew.io.files import require_writable, write_bytes
 from deskew.io.images import read_image, write_image
 from deskew.io.meshes import Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
 from deskew.io.scans import read_depth, read_depth_image, read_scan, write_depth, write_scan
@@ -15,6 +16,7 @@ from deskew.io.scans import read_depth, read_depth_image, read_scan, write_depth
 __all__ = [
     "Mesh",
     "grid_faces",
+    "read_arrays",
     "read_board",
     "read_calibration",
     "read_capture",
@@ -26,7 +28,9 @@ __all__ = [
     "read_scan",
     "require_writable",
     "sheet_mesh",
+    "write_arrays",
     "write_board",
+    "write_bytes",
     "write_calibration",
     "write_capture",
     "write_depth",

@@ -10,7 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from deskew.io.files import write_bytes
+from deskew.io import write_bytes
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.layout import Layout
 from experiments.reporting.tables import table

@@ -22,6 +22,10 @@ class Column:
         The paper's figure beside ours; a condition also stands for those that go on with "/".
     headline : bool
         Whether the summary at the head of the table shows it.
+    share : bool
+        0 or 1 a trial: the summary counts the ones, and a failed trial as none.
+    rms : bool
+        Root mean squares: the summary pools them as one.
     """
 
     metric: str
@@ -29,6 +33,8 @@ class Column:
     digits: int = 3
     paper: Mapping[str, str] = field(default_factory=dict)
     headline: bool = False
+    share: bool = False
+    rms: bool = False
 
     def paper_figure(self, condition: str) -> str:
         """Return the paper's figure for a condition, "" where it has none."""

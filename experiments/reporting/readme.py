@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 from deskew.errors import InputError
-from deskew.io.files import write_bytes
+from deskew.io import write_bytes
 
 _BLOCK = re.compile(r"(<!-- table (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 _SUMMARY = re.compile(r"^## Summary\n\n(?P<text>.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)

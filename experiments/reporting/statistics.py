@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -41,6 +42,21 @@ def summarise(values: Sequence[float]) -> Summary:
     interval = _interval(data) if len(data) >= 3 else None
     mean, median = float(data.mean()), float(np.median(data))
     return Summary(len(data), mean, median, float(data[0]), float(data[-1]), interval)
+
+
+def share_interval(n_ones: int, n: int) -> tuple[float, float]:
+    """Return Wilson's 95 % interval of a share; unlike a bootstrap's it has a width when all trials agree.
+
+    References
+    ----------
+    E. B. Wilson, "Probable inference, the law of succession, and statistical inference", JASA 22, 1927.
+    """
+    require(0 <= n_ones <= n and n > 0, "n_ones", f"be in [0, {n}] with n > 0", n_ones)
+    z = 1.959963984540054
+    share, spread = n_ones / n, z * z / n
+    middle = (share + spread / 2) / (1 + spread)
+    half = z / (1 + spread) * math.sqrt(share * (1 - share) / n + spread / (4 * n))
+    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def _interval(data: np.ndarray) -> tuple[float, float]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 
 from experiments.reporting.layout import Column, Layout
-from experiments.reporting.statistics import summarise
+from experiments.reporting.statistics import share_interval, summarise
 from experiments.trials.schema import Failure, Row
 
 # Beyond this many a line a trial is no longer read; `results.csv` has them all.
@@ -36,7 +37,12 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure]) -> s
     """
     parts = [f"# {layout.title}", layout.note]
     if any(column.headline for column in layout.columns):
-        parts += ["## Summary", "Mean over the trials, with its 95 % bootstrap interval.", _headlines(layout, rows)]
+        parts += [
+            "## Summary",
+            "Mean over the trials (of root mean squares the pooled one) with its 95 % bootstrap interval; shares with "
+            "Wilson's, a failed trial counting against them.",
+            _headlines(layout, rows),
+        ]
     if len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
         parts += ["## Each trial", _each_trial(layout, rows)]
     parts += ["## All trials", _all_trials(layout, rows)]
@@ -80,20 +86,29 @@ def _headlines(layout: Layout, rows: Sequence[Row]) -> str:
         if not any(column.metric in metrics for column in columns) and "failed" not in metrics:
             continue
         counts = [len(metrics[column.metric]) for column in columns if column.metric in metrics]
-        cells = [_mean(metrics.get(column.metric, ()), column.digits) for column in columns]
-        lines.append([condition, method, str(max(counts, default=0)), str(len(metrics.get("failed", ()))), *cells])
+        n_failed = len(metrics.get("failed", ()))
+        cells = [_headline(column, metrics.get(column.metric, ()), n_failed) for column in columns]
+        lines.append([condition, method, str(max(counts, default=0)), str(n_failed), *cells])
     paper = [next(iter(column.paper.values()), _NONE) for column in columns]
     if set(paper) != {_NONE}:
         lines.append(["the paper", _NONE, _NONE, _NONE, *paper])
     return markdown_table(("condition", "method", "n", "failed", *(column.heading for column in columns)), lines)
 
 
-def _mean(values: Sequence[float], digits: int) -> str:
+def _headline(column: Column, values: Sequence[float], n_failed: int) -> str:
+    """Return mean, pooled root mean square or share of one column, with its 95 % interval."""
     if not values:
         return _NONE
-    found = summarise(values)
-    interval = "" if found.interval is None else f" ({found.interval[0]:.{digits}f}..{found.interval[1]:.{digits}f})"
-    return f"{found.mean:.{digits}f}{interval}"
+    if column.share:
+        n, n_ones = len(values) + n_failed, int(sum(values))
+        low, high = share_interval(n_ones, n)
+        return f"{n_ones} of {n} ({100 * low:.0f}..{100 * high:.0f} %)"
+    found = summarise([value**2 for value in values]) if column.rms else summarise(values)
+    middle, ends = found.mean, found.interval
+    if column.rms:
+        middle, ends = math.sqrt(middle), None if ends is None else (math.sqrt(ends[0]), math.sqrt(ends[1]))
+    interval = "" if ends is None else f" ({ends[0]:.{column.digits}f}..{ends[1]:.{column.digits}f})"
+    return f"{middle:.{column.digits}f}{interval}"
 
 
 def _all_trials(layout: Layout, rows: Sequence[Row]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import data_synth
 from data_synth import Rig
 from deskew import pipeline
+from deskew.acquisition import SweepSettings
 from deskew.types import Calibration
 from experiments.settings import Config
 
@@ -36,4 +37,4 @@ def calibrated_bench(config: Config) -> Bench:
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
-    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures))
+    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, sweep=SweepSettings(mode=config.scan.mode)))

@@ -11,16 +11,18 @@ import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import metrics, pipeline, restoration
 from deskew.acquisition import SweepSettings
-from deskew.errors import InputError, require
-from deskew.types import Array, Capture, Floats, Pinhole, Scan, Status
+from deskew.errors import require
+from deskew.io import read_arrays
+from deskew.types import Array, Capture, Floats, Pinhole, Scan
 from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
+from experiments.studies.flattened import flattening_figures
 from experiments.studies.methods import require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.study import Study
 from experiments.studies.views import DETECTORS, restored_corners, seen_corners
-from experiments.trials import Outcome, Recorder, TrialKey
+from experiments.trials import Outcome, Recorder, TrialKey, reason_of
 
 _PAPER_PX, _PAPER_MM = 0.5, 0.25
 _N_SHOWN = 5
@@ -52,14 +54,15 @@ class CornerDistance(Study):
             Column("corner_max_px", "max [px]", 3, headline=True),
             Column("corner_mean_mm", "mean [mm]", 3, {"restored": f"< {_PAPER_MM}"}, headline=True),
             Column("corner_max_mm", "max [mm]", 3),
-            Column("meets_paper", "within the paper's", 2, headline=True),
+            Column("meets_paper", "within the paper's", headline=True, share=True),
             Column("corner_rigid_mean_mm", "rigid mean [mm]", 3, headline=True),
             Column("corner_rigid_max_mm", "rigid max [mm]", 3),
             Column("dense_mean_mm", "dense mean [mm]", 3, headline=True),
             Column("page_coverage", "coverage", 4, headline=True),
+            Column("detector_rms_px", "detector RMS [px]", 3, headline=True),
             Column("corners_missing", "missing", 0, headline=True),
             Column("corners_expected", "expected", 0),
-            Column("at_rest", "at rest", 2, headline=True),
+            Column("at_rest", "at rest", headline=True, share=True),
             Column("folded_quads", "folded quads", 0),
             Column("slope_p90_deg", "p90 slope [deg]", 1),
             Column("relief_mm", "relief [mm]", 1),
@@ -89,6 +92,8 @@ class CornerDistance(Study):
         require_methods(config)
         n = len(config.sheet.paths)
         require(n == 0 or config.trials <= n, "trials", f"be at most {n}, one a file of sheet.paths", config.trials)
+        for path in config.sheet.paths[: config.trials]:
+            _read_sheet(path)
         return Study.plan(self, config)
 
     def inputs(self, config: Config) -> dict[str, Path]:
@@ -107,27 +112,25 @@ class CornerDistance(Study):
             sheet = _sheet(config, key, rng)
             flat, flat_truth = data_synth.render(bench.rig, data_synth.flat_sheet(page.page_size_mm), page, rng)
             capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-        # The sweeps are rendered while they are decoded: this stage holds both.
-        with record.stage("scan"):
-            shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
-            scan = pipeline.scan(capture, bench.calibration, shape=shape, sweep=sweep)
-        trial = _Trial(record, bench, page, truth, scan, config.methods[0])
+        trial = _Trial(record, bench, page, truth)
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)
-        for method in config.methods:
-            with record.attempt("restored", method):
-                trial.measure_restored(method)
+        scan = trial.scanned(config, capture)
+        if scan is not None:
+            for method in config.methods:
+                trial.measure_restored(scan, method, shown=method == config.methods[0])
         return record.outcome()
 
 
 class _Trial:
-    """One sheet's pictures and what is measured on them."""
+    """One sheet's pictures and what is measured on them.
 
-    def __init__(
-        self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth, scan: Scan, shown_method: str
-    ) -> None:
-        self.shown_method = shown_method
-        self.record, self.bench, self.page, self.truth, self.scan = record, bench, page, truth, scan
+    Each detector has its own condition, and what breaks before the detectors come to it fails all of them: a page that
+    cannot be scanned or restored is a failed row of each, not a missing one.
+    """
+
+    def __init__(self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth) -> None:
+        self.record, self.bench, self.page, self.truth = record, bench, page, truth
         self.camera = bench.calibration.camera
         self.view: Pinhole = restoration.view_camera(self.camera)
         self.corners_mm: Floats = page.corners.reshape(-1, 2)
@@ -140,42 +143,63 @@ class _Trial:
         for name, detect in DETECTORS.items():
             self.control[name] = detect(image, true)
             found = metrics.corner_distance(self.control[name], true, self.view)
-            self.record.add(f"control{name}", "-", found)
+            # Without any alignment, which would hide a shift of all corners alike.
+            error = np.nansum((self.control[name] - true) ** 2, axis=1)[np.isfinite(self.control[name][:, 0])]
+            self.record.add(f"control{name}", "-", found | {"detector_rms_px": float(np.sqrt(error.mean()))})
         self._picture("control", image)
-        self._picture("model", model_view(self.scan.sheet.vertices))
 
     def measure_unrestored(self, capture: Capture, sheet: TrueSheet) -> None:
-        """Measure the crumpled page as it is, the scan and the calibration."""
+        """Measure the crumpled page as it is, with its sheet and the calibration."""
         image = restoration.undistorted_view(capture.white, self.camera)
-        seeds = seen_corners(self.truth, self.corners_mm, self.camera, self.view)
-        self._compare("unrestored", "-", image, seeds)
-        true_z = self.truth.depth_at(restoration.undistortion_map(self.camera).astype(np.float64))
-        self.record.add("unrestored", "-", metrics.depth_error(self.scan.depth, true_z))
-        self.record.add("unrestored", "-", self.bench.residuals())
+        self._compare("unrestored", "-", image, seen_corners(self.truth, self.corners_mm, self.camera, self.view))
         shape = {"slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm}
-        self.record.add("unrestored", "-", shape)
+        self.record.add("unrestored", "-", self.bench.residuals() | shape)
         self._picture("crumpled", image)
 
-    def measure_restored(self, method: str) -> None:
+    def scanned(self, config: Config, capture: Capture) -> Scan | None:
+        """Scan the page and measure the depth map; None if that failed, which fails every method."""
+        shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
+        try:
+            # The sweeps are rendered while they are decoded: this stage holds both.
+            with self.record.stage("scan"):
+                scan = pipeline.scan(capture, self.bench.calibration, shape=shape, sweep=sweep)
+        except Exception as error:
+            for method in config.methods:
+                self._fail("restored", method, error)
+            return None
+        true_z = self.truth.depth_at(restoration.undistortion_map(self.camera).astype(np.float64))
+        self.record.add("unrestored", "-", metrics.depth_error(scan.depth, true_z))
+        self._picture("model", model_view(scan.sheet.vertices))
+        return scan
+
+    def measure_restored(self, scan: Scan, method: str, *, shown: bool) -> None:
         """Restore by one method and measure the result, whether it came to rest or not."""
-        with self.record.stage("restore", "restored", method):
-            restored = pipeline.restore(self.scan, method=method)
-        uv = self.truth.page_at(restored.backward_map.astype(np.float64))
-        figures = metrics.dense_error(restored, uv, self.page.page_size_mm)
-        if restored.flattened is not None:
-            figures |= restored.flattened.counters
-            figures["at_rest"] = float(restored.flattened.status is Status.AT_REST)
+        try:
+            with self.record.stage("restore", "restored", method):
+                restored = pipeline.restore(scan, method=method)
+            uv = self.truth.page_at(restored.backward_map.astype(np.float64))
+            figures = metrics.dense_error(restored, uv, self.page.page_size_mm)
+            if restored.flattened is not None:
+                figures |= flattening_figures(scan.sheet, restored.flattened)
+        except Exception as error:
+            self._fail("restored", method, error)
+            return
         self.record.add("restored", method, figures)
         self._compare("restored", method, restored.image, restored_corners(uv, self.corners_mm))
-        if method == self.shown_method:
+        if shown:
             self._picture("restored", restored.image)
 
     def _compare(self, condition: str, method: str, image: Array, seeds: Floats) -> None:
         for name, detect in DETECTORS.items():
-            found = detect(image, seeds)
-            distance = metrics.corner_distance(found, self.control[name], self.view)
-            kept = distance["corner_mean_px"] <= _PAPER_PX and distance["corner_mean_mm"] <= _PAPER_MM
-            self.record.add(f"{condition}{name}", method, distance | {"meets_paper": float(kept)})
+            with self.record.attempt(f"{condition}{name}", method):
+                found = detect(image, seeds)
+                distance = metrics.corner_distance(found, self.control[name], self.view)
+                kept = distance["corner_mean_px"] <= _PAPER_PX and distance["corner_mean_mm"] <= _PAPER_MM
+                self.record.add(f"{condition}{name}", method, distance | {"meets_paper": float(kept)})
+
+    def _fail(self, condition: str, method: str, error: Exception) -> None:
+        for name in DETECTORS:
+            self.record.fail(f"{condition}{name}", method, reason_of(error))
 
     def _picture(self, name: str, image: Array) -> None:
         # As many pages as the paper shows: the reports are committed.
@@ -186,11 +210,13 @@ class _Trial:
 def _sheet(config: Config, key: TrialKey, rng: np.random.Generator) -> TrueSheet:
     if not config.sheet.paths:
         return data_synth.crumpled(rng, slope_p90_deg=config.sheet.slope_p90_deg)
-    path = Path(config.sheet.paths[key.trial])
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return TrueSheet(arrays["V"], arrays["F"])
-    except (OSError, KeyError, ValueError) as error:
-        raise InputError(
-            f"`sheet.paths` must be NPZ files with V (h, w, 3) and F (h, w, 2), got {path}: {error}."
-        ) from error
+    return _read_sheet(config.sheet.paths[key.trial])
+
+
+def _read_sheet(path: str) -> TrueSheet:
+    arrays = read_arrays(Path(path))
+    require({"V", "F"} <= set(arrays), path, "hold V (h, w, 3) and F (h, w, 2) [mm]", ", ".join(sorted(arrays)))
+    sheet, page = TrueSheet(arrays["V"], arrays["F"]), Checkerboard().page_size_mm
+    fits = bool(np.allclose(sheet.page_size_mm, page, atol=0.5))
+    require(fits, f"{path}: F", f"span the page of {page[0]:g} x {page[1]:g} mm", sheet.page_size_mm)
+    return sheet

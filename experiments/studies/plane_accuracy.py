@@ -45,7 +45,7 @@ class PlaneAccuracy(Study):
             Column("plane_mean_abs_mm", "mean deviation [mm]", 3, _PAPER, headline=True),
             Column("plane_rms_mm", "RMS [mm]", 3, headline=True),
             Column("plane_max_mm", "max [mm]", 3, headline=True),
-            Column("length_error_mm", "error of 300 mm, RMS [mm]", 3, headline=True),
+            Column("length_error_mm", "error of 300 mm, RMS [mm]", 3, headline=True, rms=True),
             Column("depth_raw_rms_mm", "depth RMS [mm]", 3, headline=True),
             Column("depth_raw_p95_mm", "depth p95 [mm]", 3),
             Column("depth_coverage", "coverage", 4, headline=True),
@@ -94,7 +94,8 @@ def _measure(
     true_z = truth.depth_at(restoration.undistortion_map(camera).astype(np.float64))
     deviation = acquisition.plane_deviation(acquisition.depth_points(depth, np.isfinite(true_z)))
     record.add(condition, "-", metrics.depth_error(depth, true_z))
-    record.add(condition, "-", bench.residuals() | {"tilt_deg": lean_deg[0]})
+    shape = {"tilt_deg": lean_deg[0], "slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm}
+    record.add(condition, "-", bench.residuals() | shape)
     record.add(
         condition,
         "-",

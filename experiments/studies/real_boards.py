@@ -12,10 +12,11 @@ import numpy as np
 
 from deskew import acquisition, io, metrics, pipeline, projection, restoration
 from deskew.acquisition import BoardView, DepthSettings
-from deskew.errors import require
-from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Status
+from deskew.errors import InputError, require
+from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Sheet
 from experiments.reporting import Column, Layout, Montage
 from experiments.settings import Config
+from experiments.studies.flattened import flattening_figures
 from experiments.studies.methods import require_methods
 from experiments.studies.scanned import scanned_points
 from experiments.studies.study import AbsentError, Study
@@ -65,13 +66,13 @@ class RealBoards(Study):
             Column("calib_camera_rms_px", "camera RMS [px]", 3, headline=True),
             Column("calib_projector_rms_px", "projector RMS [px]", 3, headline=True),
             Column("calib_stereo_rms_px", "stereo RMS [px]", 3, headline=True),
-            Column("length_error_units", "length error, RMS [units]", 3, headline=True),
+            Column("length_error_units", "length error, RMS [units]", 3, headline=True, rms=True),
             Column("plane_mean_abs_units", "mean deviation from a plane [units]", 3, headline=True),
             Column("corner_rigid_mean_units", "restored corners, mean [units]", 3, headline=True),
             Column("corner_rigid_max_units", "restored corners, max [units]", 3, headline=True),
             Column("corners_missing", "missing", 0, headline=True),
             Column("corners_expected", "expected", 0),
-            Column("at_rest", "at rest", 0),
+            Column("at_rest", "at rest", headline=True, share=True),
         ),
         montages=(
             Montage(
@@ -89,7 +90,7 @@ class RealBoards(Study):
         if path is None:
             raise AbsentError("real_boards.path names no folder; README says where the captures are to be had")
         if not Path(path).is_dir():
-            raise AbsentError(f"real_boards.path: there is no folder {path}")
+            raise InputError(f"`real_boards.path` must be a folder, got {path}.")
         found = content_digest(sorted(Path(path).glob("capture_*/graycode_*.png")), Path(path))
         require(found == CAPTURES_SHA256, "real_boards.path", f"hold the frames of {CAPTURES}", f"SHA-256 {found[:12]}")
         return [TrialKey(config.experiment, "calibration", "-", 0, config.seed), *trial_keys(config)]
@@ -125,7 +126,8 @@ def _measure_board(
     record: Recorder, config: Config, capture: Capture, view: BoardView, calibration: Calibration
 ) -> None:
     with record.stage("scan"):
-        depth = acquisition.depth_map(calibration, pipeline.decode(capture), _DEPTH)
+        decoded = pipeline.decode(capture)
+        depth = acquisition.depth_map(calibration, decoded, _DEPTH)
     seen = _to_view(calibration.camera, depth.camera, view.corners)
     points = scanned_points(depth, seen, _RADIUS_PX)
     errors = acquisition.length_errors(points, acquisition.board_points(BOARD), _LENGTH_MIN)
@@ -140,19 +142,21 @@ def _measure_board(
     outline = acquisition.straight_outline(_border(seen))
     with record.stage("mesh"):
         shape = (config.mesh.rows, config.mesh.columns)
-        scan = pipeline.scan(capture, on_bed, shape=shape, outline=outline, depth=_DEPTH, max_hole_px=_INK_PX)
+        scan = pipeline.scan(
+            capture, on_bed, decoded=decoded, shape=shape, outline=outline, depth=_DEPTH, max_hole_px=_INK_PX
+        )
     for method in config.methods:
         with record.attempt("restored", method):
             with record.stage("restore", "restored", method):
                 restored = pipeline.restore(scan, method=method)
-            _measure_restored(record, method, restored, seen)
+            _measure_restored(record, method, scan.sheet, restored, seen)
             if method == config.methods[0]:
                 name = f"board_{record.key.trial}"
                 record.picture(f"{name}_seen", restoration.undistorted_view(capture.white, calibration.camera))
                 record.picture(f"{name}_restored", _from_above(restored))
 
 
-def _measure_restored(record: Recorder, method: str, restored: Restoration, seeds: Floats) -> None:
+def _measure_restored(record: Recorder, method: str, sheet: Sheet, restored: Restoration, seeds: Floats) -> None:
     """Compare restored corners with exact squares; the board is flat, so they lie within pixels of where they were."""
     found = acquisition.refine_saddle(restored.image, seeds, search_px=8.0)
     here = np.isfinite(found).all(axis=1)
@@ -162,8 +166,7 @@ def _measure_restored(record: Recorder, method: str, restored: Restoration, seed
     distance = np.linalg.norm(metrics.fit_rigid(places, exact).apply(places) - exact, axis=1)
     figures |= {"corner_rigid_mean_units": float(distance.mean()), "corner_rigid_max_units": float(distance.max())}
     if restored.flattened is not None:
-        figures |= restored.flattened.counters
-        figures["at_rest"] = float(restored.flattened.status is Status.AT_REST)
+        figures |= flattening_figures(sheet, restored.flattened)
     record.add("restored", method, figures)
 
 

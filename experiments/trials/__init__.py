@@ -2,7 +2,7 @@
 
 from experiments.trials.engines import Engine, Processes, Serial
 from experiments.trials.plan import content_digest, fingerprint, settings_of, trial_keys
-from experiments.trials.record import Outcome, Recorder
+from experiments.trials.record import Outcome, Recorder, reason_of
 from experiments.trials.schema import Failure, Row, TrialKey, unit_of
 from experiments.trials.store import Store
 
@@ -18,6 +18,7 @@ __all__ = [
     "TrialKey",
     "content_digest",
     "fingerprint",
+    "reason_of",
     "settings_of",
     "trial_keys",
     "unit_of",

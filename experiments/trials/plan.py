@@ -17,7 +17,13 @@ _NO_PART_OF_A_ROW = ("engine", "out", "budget", "trials", "trials_at")
 # Keys that belong to one experiment only.
 _SECTIONS = ("real_boards",)
 # Sources that rows come from; reporting and the program around it change no row.
-SOURCES = ("deskew", "data_synth", "experiments/studies", "experiments/trials/record.py")
+SOURCES = (
+    "deskew",
+    "data_synth",
+    "experiments/studies",
+    *(f"experiments/trials/{name}.py" for name in ("engines", "record", "schema")),
+    "requirements.lock",
+)
 _ROOT = Path(__file__).resolve().parents[2]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
@@ -149,4 +150,5 @@ def _peak_mb() -> float:
         status = Path("/proc/self/status").read_text()
         return float(status.split("VmHWM:")[1].split()[0]) / 1024.0
     except (OSError, IndexError):
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return peak / (1024.0**2 if sys.platform == "darwin" else 1024.0)  # bytes there, kilobytes elsewhere

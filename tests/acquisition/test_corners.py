@@ -103,6 +103,15 @@ def test_board_is_found_with_x_to_the_right_and_rows_downwards(turn):
     assert 0.003 < np.sqrt(np.mean(np.sum((found - corners) ** 2, -1))) < 0.06
 
 
+@pytest.mark.parametrize("refine", [refine_saddle, refine_kitchen_rosenfeld])
+def test_a_blank_page_has_no_corners(refine):
+    rng = np.random.default_rng(5)
+    shaded = 150 + 0.1 * pixel_grid((300, 300))[..., 0] + 2 * rng.standard_normal((300, 300))
+    shaded[:, 150:] -= 30  # a crease
+    seeds = np.stack(np.meshgrid(np.arange(30, 280, 25.0), np.arange(30, 280, 25.0)), -1).reshape(-1, 2)
+    assert np.isnan(refine(np.clip(shaded, 0, 255).astype(np.uint8), seeds)).all()
+
+
 def test_no_board_is_said_so():
     with pytest.raises(StepError, match="no board of 8 x 5 inner corners"):
         find_board(np.full((200, 200), 128, np.uint8), (8, 5))

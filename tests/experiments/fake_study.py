@@ -16,7 +16,7 @@ from experiments.studies import AbsentError, Study
 from experiments.trials import Outcome, Recorder, TrialKey
 
 # The sheet's slope is the one number that the tests can set freely: these values ask for trouble.
-ABSENT, STEP_FAILS, TRIAL_1_FAILS, ALL_FAIL, TRIAL_1_KILLS, NAN, KILLED_ONCE = 50.0, 51.0, 52.0, 53.0, 54.0, 55.0, 56.0
+ABSENT, STEP_FAILS, TRIAL_1_FAILS, ALL_FAIL, TRIAL_1_KILLS, NAN, KILLED_ONCE = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
 
 
 class FakeStudy(Study):

@@ -11,7 +11,7 @@ from deskew.errors import InputError
 from experiments.reporting import Column, Layout, Plot
 from experiments.reporting.export import csv_text
 from experiments.reporting.figures import dot_plot, png_bytes
-from experiments.reporting.statistics import summarise
+from experiments.reporting.statistics import share_interval, summarise
 from experiments.reporting.tables import table
 from experiments.trials import Failure, Outcome, Recorder, Row, TrialKey, unit_of
 
@@ -106,6 +106,28 @@ def test_interval_covers_the_true_mean_about_as_often_as_it_says() -> None:
 @pytest.mark.parametrize("n", [1, 2])
 def test_two_trials_have_no_interval(n: int) -> None:
     assert summarise([1.0] * n).interval is None
+
+
+def test_a_failed_trial_counts_against_a_share() -> None:
+    column = Column("meets_paper", "kept", headline=True, share=True)
+    rows = rows_of([1.0, 1.0, 0.0], metric="meets_paper")
+    failed = Row.of(TrialKey("fake", trial=3, seed=1), "restored", "a", "failed", 1.0)
+    text = table(Layout("T", "N", (column,)), [*rows, failed], [])
+    assert "| restored | a | 3 | 1 | 2 of 4 (15..85 %) |" in text
+
+
+def test_root_mean_squares_are_pooled() -> None:
+    column = Column("length_error_mm", "error", 2, headline=True, rms=True)
+    text = table(Layout("T", "N", (column,)), rows_of([3.0, 4.0], metric="length_error_mm"), [])
+    assert "| restored | a | 2 | 0 | 3.54 |" in text
+
+
+def test_a_share_of_all_still_has_an_interval() -> None:
+    low, high = share_interval(30, 30)
+    assert low == pytest.approx(30 / (30 + 1.959964**2))  # Wilson: n / (n + z^2)
+
+    assert high == pytest.approx(1.0)
+    assert share_interval(0, 30)[1] == pytest.approx(1 - low)
 
 
 def test_table_shows_count_centre_spread_and_the_papers_figure() -> None:
