@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from deskew.errors import DeskewError, StepError, require
+from deskew.errors import DeskewError, require
 
 # The stages are imported inside the commands: --help and wrong options answer at once, without numba and OpenCV.
 if TYPE_CHECKING:
@@ -107,8 +107,6 @@ def _restored_figures(restoration: Restoration) -> dict[str, Any]:
     flattened = restoration.flattened
     if flattened is None:
         return {}
-    if flattened.status is Status.DIVERGED:
-        raise StepError(f"Flattening diverged: {flattened.remedy}")
     if flattened.status is not Status.AT_REST:
         _say(f"warning: the page is {flattened.status}, not at rest and flat: {flattened.remedy}")
     return {"status": str(flattened.status), **flattened.counters}
@@ -242,7 +240,15 @@ def run(
     from deskew import io
 
     io.require_writable(output, (".png", ".tif", ".tiff"))
+    _require_method(method)
     _restore(_scan(capture, io.read_calibration(calibration), shape), method, output, as_json)
+
+
+def _require_method(method: str) -> None:
+    """Refuse an unknown method before the long work rather than after it."""
+    from deskew.flattening import find_method
+
+    find_method(method)
 
 
 def _restore(found: Scan, method: str, output: Path, as_json: bool) -> None:

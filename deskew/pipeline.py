@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from deskew import acquisition, flattening, restoration
 from deskew.acquisition import DepthSettings, GrayCodeSettings, Outline, SweepSettings
-from deskew.errors import require
+from deskew.errors import StepError, require
 from deskew.types import (
     WHITE,
     Board,
@@ -19,6 +19,7 @@ from deskew.types import (
     PatternKind,
     Restoration,
     Scan,
+    Status,
 )
 
 
@@ -122,7 +123,14 @@ def restore(scan: Scan, *, method: str = "paper_euler", light: str = WHITE, **se
         Which of the scan's images to restore.
     **settings
         Of the flattening method.
+
+    Raises
+    ------
+    StepError
+        If the flattening diverged: there is nothing to texture.
     """
     require(light in scan.images, "light", f"be one of {', '.join(scan.images)}", light)
     flattened = flattening.flatten(scan.sheet, method=method, **settings)
+    if flattened.status is Status.DIVERGED:
+        raise StepError(f"Flattening diverged: {flattened.remedy}")
     return restoration.texture_quads(scan.images[light], scan.camera, scan.sheet, flattened)

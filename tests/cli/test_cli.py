@@ -194,12 +194,6 @@ def test_a_page_that_is_not_flat_is_shown_and_said_so(
     assert (here / "out" / "r.png").exists()
 
 
-def test_a_diverged_page_is_a_failed_step(here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
-    steps.status = Status.DIVERGED
-    assert run("run page -c c.json -o out/r.png", capsys) == (3, "", "deskew: Flattening diverged: push harder\n")
-    assert list((here / "out").iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("step", "line"),
     [
