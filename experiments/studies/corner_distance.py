@@ -9,10 +9,10 @@ import numpy as np
 
 import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
-from deskew import metrics, pipeline, restoration
+from deskew import acquisition, metrics, pipeline, restoration
 from deskew.acquisition import SweepSettings
 from deskew.errors import InputError, require
-from deskew.types import Array, Capture, Floats, Pinhole, Scan, Status
+from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan, Status
 from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
@@ -64,6 +64,7 @@ class CornerDistance(Study):
             Column("slope_p90_deg", "p90 slope [deg]", 1),
             Column("relief_mm", "relief [mm]", 1),
             Column("depth_raw_rms_mm", "depth RMS [mm]", 3),
+            Column("depth_rms_mm", "filtered depth RMS [mm]", 3),
             Column("depth_coverage", "depth coverage", 4),
         ),
         (
@@ -111,9 +112,14 @@ class CornerDistance(Study):
         with record.stage("scan"):
             shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
             scan = pipeline.scan(capture, bench.calibration, shape=shape, sweep=sweep)
+        raw = scan.depth
+        if config.scan.denoise:
+            with record.stage("denoise"):
+                scan = pipeline.span(capture, bench.calibration, acquisition.denoise_depth(raw), shape=shape)
         trial = _Trial(record, bench, page, truth, scan, config.methods[0])
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)
+        trial.measure_depth(raw)
         for method in config.methods:
             with record.attempt("restored", method):
                 trial.measure_restored(method)
@@ -145,16 +151,22 @@ class _Trial:
         self._picture("model", model_view(self.scan.sheet.vertices))
 
     def measure_unrestored(self, capture: Capture, sheet: TrueSheet) -> None:
-        """Measure the crumpled page as it is, the scan and the calibration."""
+        """Measure the crumpled page as it is, and the calibration."""
         image = restoration.undistorted_view(capture.white, self.camera)
         seeds = seen_corners(self.truth, self.corners_mm, self.camera, self.view)
         self._compare("unrestored", "-", image, seeds)
-        true_z = self.truth.depth_at(restoration.undistortion_map(self.camera).astype(np.float64))
-        self.record.add("unrestored", "-", metrics.depth_error(self.scan.depth, true_z))
         self.record.add("unrestored", "-", self.bench.residuals())
         shape = {"slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm}
         self.record.add("unrestored", "-", shape)
         self._picture("crumpled", image)
+
+    def measure_depth(self, raw: DepthMap) -> None:
+        """Measure the depth map as triangulated, and as filtered where the scan was."""
+        true_z = self.truth.depth_at(restoration.undistortion_map(self.camera).astype(np.float64))
+        figures = metrics.depth_error(raw, true_z)
+        if self.scan.depth is not raw:
+            figures |= metrics.depth_error(self.scan.depth, true_z, prefix="depth")
+        self.record.add("unrestored", "-", figures)
 
     def measure_restored(self, method: str) -> None:
         """Restore by one method and measure the result, whether it came to rest or not."""
