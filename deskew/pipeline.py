@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from deskew import acquisition, flattening, restoration
-from deskew.acquisition import DepthSettings, GrayCodeSettings, Outline, SweepSettings
+from deskew.acquisition import DenoiseSettings, DepthSettings, GrayCodeSettings, Outline, SweepSettings
 from deskew.errors import StepError, require
 from deskew.types import (
     WHITE,
@@ -16,6 +16,7 @@ from deskew.types import (
     Calibration,
     Capture,
     Correspondence,
+    DepthMap,
     PatternKind,
     Restoration,
     Scan,
@@ -78,6 +79,7 @@ def scan(
     sweep: SweepSettings | None = None,
     gray: GrayCodeSettings | None = None,
     depth: DepthSettings | None = None,
+    denoise: DenoiseSettings | None = None,
     max_hole_px: float = 12.0,
 ) -> Scan:
     """Scan a page: decode, cull, triangulate and span a mesh over its outline (sections 2.3 and 2.4).
@@ -98,11 +100,29 @@ def scan(
         The page in raw pixels, instead of `outline`.
     sweep, gray, depth : settings, optional
         Of the stages.
+    denoise : DenoiseSettings, optional
+        Of the filter that the depth map passes; none if not given, as in the paper.
     max_hole_px : float
         Holes in the depth map up to this distance from measured depth are filled for the mesh.
     """
     decoded = decoded or decode(capture, sweep=sweep, gray=gray)
     depth_map = acquisition.depth_map(calibration, decoded, depth)
+    if denoise is not None:
+        depth_map = acquisition.denoise_depth(depth_map, denoise)
+    return span(capture, calibration, depth_map, shape=shape, outline=outline, mask=mask, max_hole_px=max_hole_px)
+
+
+def span(
+    capture: Capture,
+    calibration: Calibration,
+    depth_map: DepthMap,
+    *,
+    shape: tuple[int, int] = (45, 45),
+    outline: Outline | None = None,
+    mask: npt.NDArray[np.bool_] | None = None,
+    max_hole_px: float = 12.0,
+) -> Scan:
+    """Span a mesh over a page whose depth is known: the last step of :func:`scan`, which see for the parameters."""
     if outline is None:
         outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask)
     mesh = acquisition.page_mesh(depth_map, outline, shape, max_hole_px=max_hole_px)

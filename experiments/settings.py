@@ -136,10 +136,15 @@ class MeshSettings(Checked):
 
 @dataclass
 class ScanSettings(Checked):
-    """How a line sweep is read (section 2.3): `spatial`, the paper's, per frame; or `temporal`, per pixel."""
+    """How a page is scanned.
+
+    `mode`: how a line sweep is read (section 2.3), `spatial`, the paper's, per frame; or `temporal`, per pixel.
+    `denoise`: whether the depth map is filtered before it is meshed; the paper's is not.
+    """
 
     group: ClassVar[str] = "scan."
     mode: str = choice("spatial", "spatial", "temporal")
+    denoise: bool = False
 
 
 @dataclass

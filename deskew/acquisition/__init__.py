@@ -15,6 +15,7 @@ from deskew.acquisition.corners import (
     refine_kitchen_rosenfeld,
     refine_saddle,
 )
+from deskew.acquisition.denoise import DenoiseSettings, denoise_depth, depth_noise
 from deskew.acquisition.depthmap import DepthSettings, depth_map
 from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
@@ -24,6 +25,7 @@ from deskew.acquisition.sweep import SweepSettings
 
 __all__ = [
     "BoardView",
+    "DenoiseSettings",
     "DepthSettings",
     "GrayCodeSettings",
     "Outline",
@@ -35,7 +37,9 @@ __all__ = [
     "calibrate",
     "decode_gray",
     "decode_sweep",
+    "denoise_depth",
     "depth_map",
+    "depth_noise",
     "depth_points",
     "find_board",
     "fit_plane",

@@ -9,11 +9,11 @@ import numpy as np
 
 import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
-from deskew import metrics, pipeline, restoration
+from deskew import acquisition, metrics, pipeline, restoration
 from deskew.acquisition import SweepSettings
 from deskew.errors import require
 from deskew.io import read_arrays
-from deskew.types import Array, Capture, Floats, Pinhole, Scan
+from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan
 from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
@@ -67,6 +67,7 @@ class CornerDistance(Study):
             Column("slope_p90_deg", "p90 slope [deg]", 1),
             Column("relief_mm", "relief [mm]", 1),
             Column("depth_raw_rms_mm", "depth RMS [mm]", 3),
+            Column("depth_rms_mm", "filtered depth RMS [mm]", 3),
             Column("depth_coverage", "depth coverage", 4),
         ),
         (
@@ -159,18 +160,30 @@ class _Trial:
     def scanned(self, config: Config, capture: Capture) -> Scan | None:
         """Scan the page and measure the depth map; None if that failed, which fails every method."""
         shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
+        calibration = self.bench.calibration
         try:
             # The sweeps are rendered while they are decoded: this stage holds both.
             with self.record.stage("scan"):
-                scan = pipeline.scan(capture, self.bench.calibration, shape=shape, sweep=sweep)
+                scan = pipeline.scan(capture, calibration, shape=shape, sweep=sweep)
+            raw = scan.depth
+            if config.scan.denoise:
+                with self.record.stage("denoise"):
+                    scan = pipeline.span(capture, calibration, acquisition.denoise_depth(raw), shape=shape)
         except Exception as error:
             for method in config.methods:
                 self._fail("restored", method, error)
             return None
-        true_z = self.truth.depth_at(restoration.undistortion_map(self.camera).astype(np.float64))
-        self.record.add("unrestored", "-", metrics.depth_error(scan.depth, true_z))
+        self._measure_depth(raw, scan.depth)
         self._picture("model", model_view(scan.sheet.vertices))
         return scan
+
+    def _measure_depth(self, raw: DepthMap, filtered: DepthMap) -> None:
+        """Measure the depth map as triangulated, and as filtered where the scan was."""
+        true_z = self.truth.depth_at(restoration.undistortion_map(self.camera).astype(np.float64))
+        figures = metrics.depth_error(raw, true_z)
+        if filtered is not raw:
+            figures |= metrics.depth_error(filtered, true_z, prefix="depth")
+        self.record.add("unrestored", "-", figures)
 
     def measure_restored(self, scan: Scan, method: str, *, shown: bool) -> None:
         """Restore by one method and measure the result, whether it came to rest or not."""
