@@ -100,7 +100,13 @@ def scan(
         Of the stages.
     max_hole_px : float
         Holes in the depth map up to this distance from measured depth are filled for the mesh.
+
+    Raises
+    ------
+    InputError
+        If the capture and the calibration are not of devices of the same sizes.
     """
+    acquisition.require_same_devices(calibration, capture)
     decoded = decoded or decode(capture, sweep=sweep, gray=gray)
     depth_map = acquisition.depth_map(calibration, decoded, depth)
     if outline is None:

@@ -101,7 +101,7 @@ def test_both_integrators_end_on_the_same_page(scan):
 
 
 def test_a_diverged_page_is_no_picture(scan):
-    with pytest.raises(StepError, match="Flattening diverged: .*lower `dt`"):
+    with pytest.raises(StepError, match=r"Flattening diverged: .*lower `dt`"):
         pipeline.restore(scan, method="paper_euler", dt=1.0)
 
 
