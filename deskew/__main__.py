@@ -2,7 +2,17 @@
 
 import sys
 
-from deskew.cli import main
+
+def run() -> int:
+    """Run the command line; an interrupt while it is still being imported is one line and code 130, as later on."""
+    try:
+        from deskew.cli import main
+
+        return main()
+    except KeyboardInterrupt:
+        print("deskew: interrupted; nothing was written.", file=sys.stderr)
+        return 130
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run())

@@ -1,22 +1,25 @@
 """The ``deskew`` command: capture folders in; calibrations, scans, figures and restored pages out.
 
 Figures go to stdout, one a line or, with --json, as one JSON object; progress and errors go to stderr. Exit codes:
-0 done, 2 a wrong input, 3 a step that failed on valid input. Nothing is written unless the command succeeds.
+0 done, 2 a wrong input, 3 a step that failed on valid input. Nothing is written unless the work succeeds; if only the
+figures cannot be printed afterwards, the error says that the file is there.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from deskew.errors import DeskewError, require
+from deskew.errors import DeskewError, StepError, require
 
 # The stages are imported inside the commands: --help and wrong options answer at once, without numba and OpenCV.
 if TYPE_CHECKING:
@@ -66,7 +69,8 @@ def _open(folder: Path) -> Capture:
 
 
 def _scan(folder: Path, calibration: Calibration, shape: tuple[int, int]) -> Scan:
-    require(min(shape) >= 2, "--shape", "be at least 2 vertices down and 2 across", f"{shape[0]} {shape[1]}")
+    allowed = all(2 <= n <= 1000 for n in shape)
+    require(allowed, "--shape", "be 2 to 1000 vertices down and across", f"{shape[0]} {shape[1]}")
     capture = _open(folder)  # before the import below: a wrong folder is then refused within the blink of an eye
     from deskew import pipeline
 
@@ -83,13 +87,18 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value  # JSON has no NaN
 
 
-def _report(figures: Mapping[str, Any], as_json: bool) -> None:
+def _report(figures: Mapping[str, Any], as_json: bool, written: Path | None = None) -> None:
+    """Print figures, and say what has been `written` already if nobody takes them."""
     plain = _plain(figures)
-    if as_json:
-        print(json.dumps(plain))
-        return
-    for key, value in plain.items():
-        print(f"{key}: {f'{value:.6g}' if isinstance(value, float) else value}")
+    lines = [f"{key}: {f'{value:.6g}' if isinstance(value, float) else value}" for key, value in plain.items()]
+    try:
+        print(json.dumps(plain) if as_json else "\n".join(lines), flush=True)
+    except OSError as error:
+        # Else the interpreter would try once more to print what is left in the buffer, and complain in its own words.
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        done = f"`{written}` is written and whole" if written else "nothing was to be written"
+        raise StepError(f"Printing the figures failed: {error.strerror or error}; {done}.") from error
 
 
 def _depth_figures(depth: DepthMap) -> dict[str, Any]:
@@ -131,7 +140,7 @@ def calibrate(
     watched = [_watched(capture, f"pose {i:02d}") for i, capture in enumerate(captures)]
     calibration = pipeline.calibrate(board, watched)
     io.write_calibration(calibration, output)
-    _report({"calibration": str(output), "n_poses": calibration.n_poses, **calibration.residuals}, as_json)
+    _report({"calibration": str(output), "n_poses": calibration.n_poses, **calibration.residuals}, as_json, output)
 
 
 @app.command()
@@ -160,9 +169,8 @@ def scan(
         texture = (projection.project(found.camera, found.sheet.vertices) + 0.5) / size
         texture[..., 1] = 1.0 - texture[..., 1]
         io.write_mesh(io.sheet_mesh(found.sheet, texture), output)
-    _report(
-        {"scan": str(output), "vertices": found.sheet.vertices[..., 0].size, **_depth_figures(found.depth)}, as_json
-    )
+    figures = {"scan": str(output), "vertices": found.sheet.vertices[..., 0].size, **_depth_figures(found.depth)}
+    _report(figures, as_json, output)
 
 
 @app.command()
@@ -200,6 +208,7 @@ def _flat_page(folder: Path, devices: Calibration) -> tuple[DepthMap, Array]:
     from deskew import acquisition, pipeline
 
     capture = _open(folder)
+    acquisition.require_same_devices(devices, capture)
     depth = acquisition.depth_map(devices, pipeline.decode(capture))
     corners = acquisition.page_outline(capture.white, capture.black, devices.camera).corners
     inside = np.zeros(depth.z.shape, np.uint8)
@@ -257,7 +266,7 @@ def _restore(found: Scan, method: str, output: Path, as_json: bool) -> None:
     restoration = pipeline.restore(found, method=method)
     figures = {"restored": str(output), "method": method, **_restored_figures(restoration)}
     io.write_image(restoration.image, output)
-    _report(figures, as_json)
+    _report(figures, as_json, output)
 
 
 def _say(message: str) -> None:

@@ -104,7 +104,13 @@ def scan(
         Of the filter that the depth map passes; none if not given, as in the paper.
     max_hole_px : float
         Holes in the depth map up to this distance from measured depth are filled for the mesh.
+
+    Raises
+    ------
+    InputError
+        If the capture and the calibration are not of devices of the same sizes.
     """
+    acquisition.require_same_devices(calibration, capture)
     decoded = decoded or decode(capture, sweep=sweep, gray=gray)
     depth_map = acquisition.depth_map(calibration, decoded, depth)
     if denoise is not None:

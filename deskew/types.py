@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from deskew.errors import require
+from deskew.errors import is_whole, require
 
 Array = npt.NDArray[Any]
 Floats = npt.NDArray[np.floating[Any]]
@@ -25,6 +25,13 @@ WHITE = "white"  # the light under which every capture is taken
 def _require_finite(name: str, values: Array, shape: tuple[int, ...]) -> None:
     require(values.shape == shape, name, f"have shape {shape}", values.shape)
     require(bool(np.isfinite(values).all()), name, "be finite", "NaN or infinity")
+
+
+def _require_numbers(name: str, values: object, kinds: str) -> None:
+    """Require an array of one of numpy's `kinds`: "iu" of whole numbers, "fiu" of real ones."""
+    got = values.dtype if isinstance(values, np.ndarray) else type(values).__name__
+    good = isinstance(values, np.ndarray) and values.dtype.kind in kinds
+    require(good, name, f"be an array of {'whole' if kinds == 'iu' else 'real'} numbers", got)
 
 
 def _require_size(name: str, size: Size) -> None:
@@ -114,7 +121,11 @@ class Capture:
     def __post_init__(self) -> None:
         _require_size("projector_size", self.projector_size)
         require(WHITE not in self.textures, "textures", "have names of their own", f"one called {WHITE}")
-        require(self.white.ndim in (2, 3), "white", "be (height, width[, 3])", self.white.shape)
+        for name in ("white", "black"):
+            image = getattr(self, name)
+            require(isinstance(image, np.ndarray), name, "be an array of grey levels", type(image).__name__)
+        picture = self.white.ndim in (2, 3) and self.white.size > 0
+        require(picture, "white", "be (height, width[, 3]) of at least 1 pixel", self.white.shape)
         require(
             self.black.shape == self.white.shape, "black", f"have white's shape {self.white.shape}", self.black.shape
         )
@@ -151,12 +162,8 @@ class Board:
     unit: str = "mm"
 
     def __post_init__(self) -> None:
-        require(
-            len(self.shape) == 2 and min(self.shape) >= 3,
-            "shape",
-            "be (nx, ny) of at least 3 inner corners",
-            self.shape,
-        )
+        corners = len(self.shape) == 2 and all(is_whole(n, 3, 1000) for n in self.shape)
+        require(corners, "shape", "be (nx, ny) of at least 3 inner corners, at most 1000", self.shape)
         require(bool(np.isfinite(self.square)) and self.square > 0, "square", "be a positive length", self.square)
 
 
@@ -171,6 +178,11 @@ class Reason(IntEnum):
     EPIPOLAR = 5
     RANGE = 6
     EDGE = 7
+
+
+def _require_reasons(reason: Array) -> None:
+    known = reason.dtype.kind in "iu" and bool(((reason >= 0) & (reason <= max(Reason))).all())
+    require(known, "reason", f"hold whole numbers in [0, {int(max(Reason))}]", f"others, of type {reason.dtype}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +206,7 @@ class Correspondence:
         require(len(shape) == 2, "column", "be (height, width)", shape)
         require(self.row.shape == shape, "row", f"have column's shape {shape}", self.row.shape)
         require(self.reason.shape == shape, "reason", f"have column's shape {shape}", self.reason.shape)
+        _require_reasons(self.reason)
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +257,7 @@ class DepthMap:
         width, height = self.camera.size
         require(self.z.shape == (height, width), "z", f"have the camera's shape {(height, width)}", self.z.shape)
         require(self.reason.shape == self.z.shape, "reason", f"have z's shape {self.z.shape}", self.reason.shape)
+        _require_reasons(self.reason)
         require(not self.camera.distortion.any(), "camera", "be free of distortion", self.camera.distortion.tolist())
         require(
             bool(np.array_equal(np.isfinite(self.z), self.reason == 0)),
@@ -272,6 +286,11 @@ class Sheet:
     stiffness: Floats | None = None
 
     def __post_init__(self) -> None:
+        _require_numbers("vertices", self.vertices, "fiu")
+        if self.faces is not None:
+            _require_numbers("faces", self.faces, "iu")
+        if self.stiffness is not None:
+            _require_numbers("stiffness", self.stiffness, "fiu")
         vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
         object.__setattr__(self, "vertices", vertices)
         if self.faces is None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from deskew.errors import InputError, StepError
-from experiments.reporting.export import Results, write_report
+from experiments.reporting.export import Results, require_targets, write_report
 from experiments.reporting.provenance import provenance
 from experiments.settings import Config
 from experiments.studies import Study, find_study
@@ -53,6 +53,7 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
         raise InputError("`out` must lie outside reports/ when `budget` is smoke, got a folder in it.")
     study = find_study(config.experiment)
     keys = study.plan(config)
+    require_targets(out, study.layout)
     settings = settings_of(config, study.inputs(config))
     identity = fingerprint(settings)
     with Store(out, identity) as store:

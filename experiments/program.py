@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import hydra
 from hydra._internal.utils import get_args_parser
@@ -19,9 +19,9 @@ from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
-from deskew.errors import DeskewError, InputError
+from deskew.errors import DeskewError, InputError, StepError
 from experiments.campaign import carry_out_campaign
-from experiments.complaints import one_line
+from experiments.complaints import one_line, refuse_arguments
 from experiments.settings import Config
 from experiments.studies import STUDIES, AbsentError
 
@@ -36,27 +36,33 @@ def main(arguments: Sequence[str]) -> int:
     int
         0 if it ran, 2 for wrong input, 3 if a step failed, 130 if it was interrupted; the worst of a multirun.
     """
-    codes = [0]
+    codes, crashes = [0], list[Exception]()
     ConfigStore.instance().store("schema", Config)
     # A sweep's folder cannot wait until `out` is resolved for each job.
     OmegaConf.register_new_resolver("either", lambda first, second: first or second, replace=True)
 
     def task(config: DictConfig) -> None:
-        codes.append(_run_job(config))
+        try:
+            codes.append(_run_job(config, arguments))
+        except Exception as error:
+            crashes.append(error)
+            raise
 
     try:
         with _hydra_raises(arguments):
             hydra.main(config_path=str(_CONF), config_name="config", version_base="1.3")(task)()
-    except (HydraException, OmegaConfBaseException, DeskewError) as error:
-        print(one_line(error), file=sys.stderr)
-        return error.exit_code if isinstance(error, DeskewError) else InputError.exit_code
+    except (HydraException, OmegaConfBaseException, ValueError, KeyError, OSError) as error:
+        # Hydra raises plain errors too for what it cannot use; a job's own are faults of this program.
+        if error in crashes:
+            raise
+        return _complain(error, arguments)
     except KeyboardInterrupt:
         print("Interrupted; finished trials are kept, and the same command goes on from there.", file=sys.stderr)
         return 130
     return max(codes)
 
 
-def _run_job(composed: DictConfig) -> int:
+def _run_job(composed: DictConfig, arguments: Sequence[str]) -> int:
     try:
         config, out = _checked(composed)
         finished = carry_out_campaign(config, out)
@@ -64,17 +70,26 @@ def _run_job(composed: DictConfig) -> int:
         print(f"{composed.experiment}: absent: {absence}")
         return 0
     except (OmegaConfBaseException, DeskewError) as error:
-        print(one_line(error), file=sys.stderr)
-        return error.exit_code if isinstance(error, DeskewError) else InputError.exit_code
+        return _complain(error, arguments)
+    except (OSError, MemoryError) as error:
+        reason = str(error) or "there is not enough memory; choose fewer engine.workers"
+        return _complain(StepError(f"{composed.experiment}: the system refused: {reason}."), arguments)
     failed = f", {finished.n_failed} failed (see {finished.out / 'run.json'})" if finished.n_failed else ""
     print(f"{config.experiment}: {finished.n_planned} trials, {finished.n_run} run now{failed} -> {finished.out}")
     return 0
 
 
+def _complain(error: Exception, arguments: Sequence[str]) -> int:
+    print(one_line(error, arguments), file=sys.stderr)
+    return error.exit_code if isinstance(error, DeskewError) else InputError.exit_code
+
+
 def _checked(composed: DictConfig) -> tuple[Config, Path]:
     """Turn the composed configuration into checked objects and say where the run writes."""
     job = HydraConfig.get()
-    for override in job.overrides.task:
+    # As they were given: a reference that leads nowhere is complained of by its own key.
+    overrides: Any = OmegaConf.to_container(job.overrides.task, resolve=False)
+    for override in overrides:
         if override.startswith(("+", "~")):
             name = override.lstrip("+~").split("=")[0]
             raise InputError(f"`{name}` must be an existing key that is given as {name}=VALUE, got {override}.")
@@ -102,7 +117,7 @@ def _hydra_raises(arguments: Sequence[str]) -> Iterator[None]:
     sys.argv = ["experiments", *arguments]
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
-        _Parser(parents=[get_args_parser()], add_help=False).parse_args(list(arguments))
+        refuse_arguments(_Parser(parents=[get_args_parser()], add_help=False).parse_args(list(arguments)), _CONF)
         yield
     finally:
         sys.argv = before

@@ -165,7 +165,9 @@ class Config(Checked):
     trials_at: TrialsAt = field(default_factory=TrialsAt)
     # One name or a list of names: Hydra has no type for that, so it is checked and made a list here.
     method: Any = setting(["paper_euler", "paper_rk4"], "be a method's name or a list of different names", bool)
-    out: str | None = None
+    out: str | None = setting(
+        None, "be the name of a folder, without line breaks", lambda value: value is None or value.isprintable()
+    )
     budget: BudgetSettings = field(default_factory=BudgetSettings)
     engine: EngineSettings = field(default_factory=EngineSettings)
     sheet: SheetSettings = field(default_factory=SheetSettings)

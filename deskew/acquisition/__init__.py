@@ -18,6 +18,7 @@ from deskew.acquisition.corners import (
 from deskew.acquisition.denoise import DenoiseSettings, denoise_depth, depth_noise
 from deskew.acquisition.depthmap import DepthSettings, depth_map
 from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
+from deskew.acquisition.matches import require_same_devices
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, page_outline, straight_outline
 from deskew.acquisition.stripes import decode_sweep
@@ -51,6 +52,7 @@ __all__ = [
     "plane_deviation",
     "refine_kitchen_rosenfeld",
     "refine_saddle",
+    "require_same_devices",
     "straight_outline",
     "view_board",
 ]

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from deskew.acquisition.bundle import INTRINSICS, Bundle, Observations, Refined, on_board, refine
 from deskew.acquisition.corners import find_board
 from deskew.acquisition.grey import grey_levels
-from deskew.errors import StepError, require
+from deskew.errors import StepError, require, require_whole
 from deskew.types import Board, Calibration, Capture, Correspondence, Floats, Pinhole, Size
 
 MIN_POSES = 3
@@ -25,6 +25,7 @@ MIN_TILT_DEG = 8.0
 _TIGHT = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 500, 1e-12)
 # Starts of the projector's principal point, in frame heights: a table projector's lens shift puts it off its frame.
 _SHIFTS = (0.5, 1.1, -0.1)
+_FEWEST_PIXELS = 100  # that show a pose to the projector
 _MARGIN_SQUARES = 0.2  # kept from a square's edge, where ink bends the stripe's peak
 
 
@@ -70,21 +71,26 @@ def view_board(board: Board, capture: Capture, correspondence: Correspondence, n
     correspondence : Correspondence
         The same capture, decoded.
     n_pixels_max : int
-        Pixels kept, spread evenly over those that qualify.
+        Pixels kept, spread evenly over those that qualify; at least 100.
 
     Raises
     ------
+    InputError
+        If the correspondence is of another size than the capture.
     StepError
         If the board is not found or hardly any pixel inside it is decoded.
     """
-    lit = grey_levels(capture.white).astype(np.float64) - grey_levels(capture.black)
+    require_whole("n_pixels_max", n_pixels_max, _FEWEST_PIXELS, 1_000_000_000)
+    lit = grey_levels(capture.white, "white").astype(np.float64) - grey_levels(capture.black, "black")
+    got = correspondence.column.shape
+    require(got == lit.shape, "correspondence", f"have the capture's shape {lit.shape}", got)
     corners = find_board(lit, board.shape)
     chosen = np.isfinite(correspondence.column) & np.isfinite(correspondence.row) & _inside_white(board, corners, lit)
     y, x = np.nonzero(chosen)
-    if len(x) < 100:
+    if len(x) < _FEWEST_PIXELS:
         raise StepError(
-            f"board observation: only {len(x)} decoded pixels inside the board's white squares, at least 100 are "
-            "needed; check that the projector covers the board and is not saturated."
+            f"board observation: only {len(x)} decoded pixels inside the board's white squares, at least "
+            f"{_FEWEST_PIXELS} are needed; check that the projector covers the board and is not saturated."
         )
     kept = np.unique(np.linspace(0, len(x) - 1, min(n_pixels_max, len(x))).astype(int))
     x, y = x[kept], y[kept]
@@ -105,6 +111,8 @@ def _inside_white(board: Board, corners: Floats, lit: Floats) -> np.ndarray:
     inner = np.abs(place - square - 0.5).max(axis=-1) < 0.5 - _MARGIN_SQUARES
     inner &= (place > 0).all(axis=-1) & (place[..., 0] < nx - 1) & (place[..., 1] < ny - 1)
     odd = square.sum(axis=-1) % 2 == 1
+    if not ((inner & odd).any() and (inner & ~odd).any()):
+        return np.zeros(lit.shape, dtype=bool)  # squares too small to hold a pixel
     white_is_odd = lit[inner & odd].mean() > lit[inner & ~odd].mean()
     return np.asarray(inner & (odd == white_is_odd))
 
@@ -129,7 +137,7 @@ def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
     Raises
     ------
     InputError
-        If the views are not all of the same devices.
+        If the views are not all of the same devices, or one does not hold the board's corners.
     StepError
         If there are too few poses, or the poses do not determine the devices.
     """
@@ -142,6 +150,9 @@ def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
     require(len(sizes) == 1, "views", "be of one camera and one projector size", sorted(sizes))
     ((camera_size, projector_size),) = sizes
     points = board_points(board)
+    for i, view in enumerate(views):
+        shape, wanted = np.shape(view.corners), (len(points), 2)
+        require(shape == wanted, f"views[{i}].corners", f"have shape {wanted}, one row a corner", shape)
     seen = Observations(
         points=points,
         corners=np.stack([view.corners for view in views]),
@@ -161,18 +172,29 @@ def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
 def _camera_alone(seen: Observations, size: Size) -> tuple[float, Pinhole, Floats]:
     """Return the RMS, the camera at the origin and the (P, 6) board poses: OpenCV's calibration run to convergence."""
     n_poses = len(seen.corners)
-    rms, K, distortion, rvecs, tvecs = cv2.calibrateCamera(
-        [seen.points.astype(np.float32)] * n_poses,
-        [corners.astype(np.float32) for corners in seen.corners],
-        size,
-        None,
-        None,
-        flags=cv2.CALIB_FIX_K3,
-        criteria=_TIGHT,
-    )
+    objects = [seen.points.astype(np.float32)] * n_poses
+    fitted = _fit(objects, [corners.astype(np.float32) for corners in seen.corners], size, None)
+    if fitted is None:
+        raise StepError("calibration: the camera could not be fitted; add poses with different tilts.")
+    rms, K, distortion, rvecs, tvecs = fitted
     camera = Pinhole(size, K, _brown(distortion), np.eye(3), np.zeros(3))
     poses = np.concatenate([np.reshape(rvecs, (n_poses, 3)), np.reshape(tvecs, (n_poses, 3))], axis=1)
-    return float(rms), camera, poses
+    return rms, camera, poses
+
+
+def _fit(
+    objects: list[Floats], images: list[Floats], size: Size, guess: Floats | None
+) -> tuple[float, Floats, Floats, Floats, Floats] | None:
+    """Run OpenCV's calibration to convergence: RMS, K, distortion, poses; None where it finds no camera at all."""
+    flags = cv2.CALIB_FIX_K3 | (0 if guess is None else cv2.CALIB_USE_INTRINSIC_GUESS)
+    start = None if guess is None else np.zeros(5)
+    try:
+        rms, K, *rest = cv2.calibrateCamera(objects, images, size, guess, start, flags=flags, criteria=_TIGHT)
+    except cv2.error:
+        return None
+    found = np.isfinite(rms) and bool(np.isfinite(K).all()) and min(K[0, 0], K[1, 1]) > 0
+    distortion, rvecs, tvecs = (np.asarray(values, dtype=np.float64) for values in rest)
+    return (float(rms), K, distortion, rvecs, tvecs) if found else None
 
 
 def _require_different_tilts(poses: Floats) -> None:
@@ -201,17 +223,17 @@ def _projector_alone(seen: Observations, camera: Pinhole, poses: Floats, size: S
     best: tuple[float, Pinhole] | None = None
     for shift in _SHIFTS:
         guess = np.array([[2.0 * width, 0, width / 2], [0, 2.0 * width, (1 + shift) * height], [0, 0, 1]])
-        flags = cv2.CALIB_USE_INTRINSIC_GUESS | cv2.CALIB_FIX_K3
-        rms, K, distortion, rvecs, tvecs = cv2.calibrateCamera(
-            objects, images, (width, 3 * height), guess, np.zeros(5), flags=flags, criteria=_TIGHT
-        )
+        fitted = _fit(objects, images, (width, 3 * height), guess)
+        if fitted is None:
+            continue
+        rms, K, distortion, rvecs, tvecs = fitted
         K[1, 2] -= height
         # The board's pose in the projector after its pose in the camera, averaged over the boards.
         relative = Rotation.from_rotvec(np.reshape(rvecs, (n_poses, 3))) * rotations.inv()
         rotation = relative.mean()
         translation = np.mean(np.reshape(tvecs, (n_poses, 3)) - rotation.apply(poses[:, 3:]), axis=0)
-        if np.isfinite(rms) and min(K[0, 0], K[1, 1]) > 0 and (best is None or rms < best[0]):
-            best = float(rms), Pinhole(size, K, _brown(distortion), rotation.as_matrix(), translation)
+        if best is None or rms < best[0]:
+            best = rms, Pinhole(size, K, _brown(distortion), rotation.as_matrix(), translation)
     if best is None:
         raise StepError(
             "calibration: the projector could not be fitted from any start; add poses with different tilts."

@@ -7,6 +7,7 @@ usable reading is the re-centred centroid of its magnitude; the naive one is kep
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
@@ -14,12 +15,14 @@ import numpy as np
 from scipy import ndimage
 
 from deskew.acquisition.grey import grey_levels
-from deskew.errors import StepError, require
+from deskew.errors import StepError, is_whole, require, require_positive, require_whole
 from deskew.types import Array, Floats
 
 _LOST = np.full(2, np.nan)
+_SMALLEST_IMAGE_PX = 16
 # A corner's saddle must stand out of the image's noise by this many standard deviations; on a blank page none does.
 SADDLE_SNR = 10.0
+LARGEST_WINDOW_PX = 100
 
 
 class Derivatives(NamedTuple):
@@ -40,9 +43,9 @@ def derivatives(image: Array, sigma_px: float) -> Derivatives:
     image : (height, width[, 3]) array
         Grey levels.
     sigma_px : float
-        Scale, positive.
+        Scale, in (0, 100].
     """
-    require(sigma_px > 0, "sigma_px", "be positive", sigma_px)
+    require_positive("sigma_px", sigma_px, LARGEST_WINDOW_PX, "px")
     grey = grey_levels(image).astype(np.float64)
     orders = ((0, 1), (1, 0), (0, 2), (1, 1), (2, 0))  # (along y, along x)
     return Derivatives(*(ndimage.gaussian_filter(grey, sigma_px, order=order, mode="nearest") for order in orders))
@@ -102,6 +105,7 @@ def kitchen_rosenfeld_peaks(image: Array, seeds: Floats, *, radius_px: int = 10,
     Kept to show why the paper's "0.1 pixel accuracy" needs the centroid; parameters as in
     :func:`refine_kitchen_rosenfeld`.
     """
+    require_whole("radius_px", radius_px, 1, LARGEST_WINDOW_PX)
     response = np.abs(kitchen_rosenfeld(derivatives(image, sigma_px)))
     found = np.full_like(_require_seeds(seeds), np.nan)
     for i, seed in enumerate(seeds):
@@ -136,6 +140,7 @@ def refine_kitchen_rosenfeld(
         Corners [px], NaN where the window left the image, the centroid ran further than `radius_px` from its seed, or
         no saddle stands out of the noise there.
     """
+    require_whole("radius_px", radius_px, 1, LARGEST_WINDOW_PX)
     d = derivatives(image, sigma_px)
     response = np.abs(kitchen_rosenfeld(d))
     refined = np.full_like(_require_seeds(seeds), np.nan)
@@ -186,6 +191,7 @@ def refine_saddle(
     (N, 2) array
         Corners [px], NaN where no saddle within `search_px` + `sigma_px` of the seed stands out of the noise.
     """
+    require_positive("search_px", search_px, LARGEST_WINDOW_PX, "px")
     d = derivatives(image, sigma_px)
     strength = _saddle_strength(image, d, sigma_px)
     start = _strongest(strength, _require_seeds(seeds), search_px)
@@ -240,10 +246,16 @@ def find_board(image: Array, shape: tuple[int, int]) -> Floats:
 
     Raises
     ------
+    InputError
+        If the shape is not that of a board, or the image too small to hold one.
     StepError
         If the board is not found, or a corner is lost.
     """
+    sound = isinstance(shape, Sequence) and len(shape) == 2 and all(is_whole(n, 3, 1000) for n in shape)
+    require(sound, "shape", "be (nx, ny) of at least 3 inner corners, at most 1000", shape)
     grey = grey_levels(image).astype(np.float64)
+    least = _SMALLEST_IMAGE_PX
+    require(min(grey.shape) >= least, "image", f"be at least {least} x {least} pixels to show a board", grey.shape)
     scaled = np.clip(255 * grey / max(float(np.percentile(grey, 99.5)), 1e-9), 0, 255).astype(np.uint8)
     flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
     found, corners = cv2.findChessboardCornersSB(scaled, shape, flags=flags)

@@ -24,7 +24,9 @@ def line_distance(matches: Matches) -> Floats:
     directions = np.concatenate([matches.camera, np.ones((len(matches.camera), 1))], axis=1)
     lines = np.cross(matches.t, directions @ matches.R.T)
     normals = lines[:, :2] / matches.focal_px
-    return np.asarray(((lines[:, :2] * matches.projector).sum(1) + lines[:, 2]) / np.hypot(*normals.T))
+    offset = (lines[:, :2] * matches.projector).sum(1) + lines[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):  # devices in one place have no lines: no distance is small
+        return np.asarray(offset / np.hypot(*normals.T))
 
 
 def epipolar_distance(calibration: Calibration, correspondence: Correspondence) -> Floats:

@@ -7,15 +7,17 @@ crosses zero between two neighbouring camera pixels is the border between two pr
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 from scipy import ndimage
 
+from deskew.acquisition.frames import read_frames
 from deskew.acquisition.grey import grey_levels
-from deskew.errors import require
-from deskew.types import Array, Capture, Correspondence, Floats, Frames, PatternKind, Reason
+from deskew.errors import require, require_positive, require_whole
+from deskew.types import Array, Capture, Correspondence, Floats, PatternKind, Reason
 
 _ROUNDING = float(1 / np.sqrt(12))  # no camera is quieter than the rounding of its grey levels
 
@@ -50,11 +52,12 @@ class GrayCodeSettings:
     subpixel: bool = True
 
     def __post_init__(self) -> None:
-        require(self.shadow_snr > 0, "shadow_snr", "be positive", self.shadow_snr)
-        require(self.bit_snr > 0, "bit_snr", "be positive", self.bit_snr)
-        require(self.gap_max_px >= 2, "gap_max_px", "be at least 2", self.gap_max_px)
-        require(self.ink_slope_max > 0, "ink_slope_max", "be positive [1/px]", self.ink_slope_max)
-        require(self.n_dropped_max >= 0, "n_dropped_max", "be at least 0", self.n_dropped_max)
+        require_positive("shadow_snr", self.shadow_snr, 1e6)
+        require_positive("bit_snr", self.bit_snr, 1e6)
+        require_whole("gap_max_px", self.gap_max_px, 2, 100_000)
+        require_positive("ink_slope_max", self.ink_slope_max, 1e6, "1/px")
+        require_whole("n_dropped_max", self.n_dropped_max, 0, 16)
+        require(isinstance(self.subpixel, bool), "subpixel", "be true or false", repr(self.subpixel))
 
 
 def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> Correspondence:
@@ -71,12 +74,20 @@ def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> C
     -------
     Correspondence
         Projector coordinates [px] at raw camera pixels.
+
+    Raises
+    ------
+    InputError
+        The capture is no Gray code, a frame differs from `white` in shape or type, or too few or too many come.
+    StepError
+        Reading a frame failed.
     """
     require(capture.pattern is PatternKind.GRAY_CODE, "capture", "hold a Gray code", capture.pattern)
     settings = settings or GrayCodeSettings()
-    white, black = (grey_levels(image).astype(np.float64) for image in (capture.white, capture.black))
-    columns, noise = _differences(capture.columns, white + black)
-    rows, _ = _differences(capture.rows, white + black)
+    still = grey_levels(capture.white, "white")
+    white, black = (image.astype(np.float64) for image in (still, grey_levels(capture.black, "black")))
+    columns, noise = _differences(read_frames(capture.columns, still, "columns"), white + black)
+    rows, _ = _differences(read_frames(capture.rows, still, "rows"), white + black)
     shadow = white - black < settings.shadow_snr * noise
     # A border between rows runs along the image's x: transpose, so that both sweeps are read along the last axis.
     column = _decode_axis(columns, shadow, noise, capture.projector_size[0], settings)
@@ -95,15 +106,14 @@ def _ink_slope(lit: Floats, noise: Floats) -> Floats:
     return np.asarray(ndimage.gaussian_gradient_magnitude(lit, 1.0) / smooth)
 
 
-def _differences(frames: Frames, both: Floats) -> tuple[Floats, Floats]:
+def _differences(planes: Iterator[Array], both: Floats) -> tuple[Floats, Floats]:
     """Pattern minus inverse of each bit, (bits, height, width), and each pixel's noise in one frame [grey levels].
 
     Light adds up: pattern + inverse - (white + black) is noise alone, of four frames.
     """
-    planes = iter(frames)
     differences, noise = [], []
     for pattern, inverse in zip(planes, planes, strict=True):
-        light, dark = (grey_levels(frame).astype(np.float32) for frame in (pattern, inverse))
+        light, dark = pattern.astype(np.float32), inverse.astype(np.float32)
         differences.append(light - dark)
         noise.append(_noise_by_level(light + dark - both, both))
     variance = np.median(noise, axis=0) / 4
@@ -133,7 +143,8 @@ def _decode_axis(differences: Floats, shadow: Array, noise: Floats, extent: int,
     differences = np.ascontiguousarray(differences)
     faint = np.abs(differences) < settings.bit_snr * np.sqrt(2) * noise
     coordinate = np.full(shadow.shape, np.nan)
-    for n_dropped in range(1 + (settings.n_dropped_max if settings.subpixel else 0)):
+    n_dropped_max = min(settings.n_dropped_max, len(differences) - 1) if settings.subpixel else 0
+    for n_dropped in range(1 + n_dropped_max):
         n_bits = len(differences) - n_dropped
         index = _gray_to_index(differences[:n_bits] > 0)
         beyond = (index << n_dropped) >= extent

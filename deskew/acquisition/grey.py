@@ -26,8 +26,11 @@ def grey_levels(image: Array, name: str = "image") -> Array:
     (height, width) array
         Of the image's type.
     """
+    require(isinstance(image, np.ndarray), name, "be an array of grey levels", type(image).__name__)
     kind = image.dtype
     require(kind in (np.uint8, np.uint16) or kind.kind == "f", name, "be of type uint8, uint16 or float", kind)
+    require(image.size > 0, name, "have at least 1 pixel", image.shape)
+    require(kind.kind != "f" or bool(np.isfinite(image).all()), name, "be finite", "NaN or infinity")
     if image.ndim == 2:
         return np.ascontiguousarray(image)
     require(image.ndim == 3 and image.shape[2] == 3, name, "be (height, width[, 3])", image.shape)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from deskew.errors import require
 from deskew.projection import pixel_grid, undistort
-from deskew.types import Calibration, Correspondence, Floats, Reason
+from deskew.types import Calibration, Capture, Correspondence, Floats, Reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,16 @@ class Matches:
     R: Floats
     t: Floats
     focal_px: Floats
+
+
+def require_same_devices(calibration: Calibration, capture: Capture) -> None:
+    """Raise an InputError unless a capture is of the sizes of the calibrated devices."""
+    for name, calibrated, got in (
+        ("camera", calibration.camera, capture.camera_size),
+        ("projector", calibration.projector, capture.projector_size),
+    ):
+        size = tuple(calibrated.size)
+        require(tuple(got) == size, f"capture.{name}_size", f"equal calibration.{name}.size {size}", tuple(got))
 
 
 def match(calibration: Calibration, correspondence: Correspondence) -> Matches:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy import ndimage
 from deskew import projection
 from deskew.acquisition.fill import FilledDepth, fill_depth
 from deskew.acquisition.outline import Outline
-from deskew.errors import StepError, require
+from deskew.errors import StepError, is_whole, require
 from deskew.types import DepthMap, Floats, Pinhole, Sheet
 
 # Spacing at which a side's length in space is measured [px]: wide enough for depth noise not to lengthen it unevenly.
@@ -51,7 +52,7 @@ def page_mesh(
     outline : Outline
         The page's boundary on the same grid.
     shape : (rows, columns)
-        Vertices of the mesh, at least 2 x 2.
+        Vertices of the mesh, from 2 x 2 to 1000 x 1000.
     max_hole_px : float
         Depth is carried over the page's rim and over holes up to this distance from measured depth [px].
 
@@ -62,11 +63,12 @@ def page_mesh(
     Raises
     ------
     InputError
-        If the mesh is smaller than 2 x 2.
+        If the mesh is smaller than 2 x 2 or larger than 1000 x 1000.
     StepError
         If a hole is too large, or the outline is so concave that the grid overlaps itself.
     """
-    require(len(shape) == 2 and min(shape) >= 2, "shape", "be (rows, columns) of at least 2 x 2 vertices", shape)
+    sound = isinstance(shape, Sequence) and len(shape) == 2 and all(is_whole(n, 2, 1000) for n in shape)
+    require(sound, "shape", "be (rows, columns) of at least 2 x 2 vertices, at most 1000 x 1000", shape)
     filled = fill_depth(depth, outline, max_hole_px)
     rows, columns = shape
     top = _even_nodes(outline.top, filled, depth.camera, columns)

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from deskew.acquisition.sweep import Scene, Sweep, SweepSettings, grey_frames, still_scene
+from deskew.acquisition.frames import read_frames
+from deskew.acquisition.sweep import Scene, Sweep, SweepSettings, still_scene
 from deskew.acquisition.sweep_spatial import decode_spatial
 from deskew.acquisition.sweep_temporal import decode_temporal
 from deskew.errors import StepError, require
@@ -19,7 +20,7 @@ __all__ = ["SweepSettings", "decode_sweep"]
 def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) -> Sweep:
     n_frames = len(frames)
     require(n_frames >= settings.window, name, f"hold at least {settings.window} frames, one window", n_frames)
-    grey = grey_frames(frames, scene, name)
+    grey = read_frames(frames, scene.white, name)
     if settings.mode == "temporal":
         return decode_temporal(grey, n_frames, scene, settings)
     return decode_spatial(grey, n_frames, scene, settings, along_rows=name == "columns")
@@ -44,9 +45,9 @@ def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Cor
     Raises
     ------
     InputError
-        The capture is no line sweep, or a frame differs from `white` in shape or type.
+        The capture is no line sweep, a frame differs from `white` in shape or type, or too few or too many come.
     StepError
-        No pixel saw a stripe.
+        Reading a frame failed, or no pixel saw a stripe.
     """
     settings = settings or SweepSettings()
     kind = capture.pattern

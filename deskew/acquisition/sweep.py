@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +10,8 @@ import numpy.typing as npt
 
 from deskew.acquisition.grey import grey_levels
 from deskew.acquisition.peaks import fit_profiles
-from deskew.errors import require
-from deskew.types import Array, Capture, Floats, Frames, Reason
+from deskew.errors import require, require_positive, require_whole
+from deskew.types import Array, Capture, Floats, Reason
 
 RIVAL_SNR = 5.5  # of the highest noise among a thousand samples with a margin: a second peak must stand above it
 _MEASURES_WIDTH = 15.0  # signal-to-noise ratio from which a peak measures its own width to better than a tenth
@@ -61,18 +60,14 @@ class SweepSettings:
     def __post_init__(self) -> None:
         require(self.mode in ("temporal", "spatial"), "mode", "be 'temporal' or 'spatial'", repr(self.mode))
         require(self.peak in ("gauss", "integer"), "peak", "be 'gauss' or 'integer'", repr(self.peak))
-        require(2 <= self.half_width <= 15, "half_width", "be in [2, 15] samples", self.half_width)
-        require(self.min_snr > 0, "min_snr", "be positive", self.min_snr)
-        require(self.shadow_snr > 0, "shadow_snr", "be positive", self.shadow_snr)
+        require_whole("half_width", self.half_width, 2, 15)
+        require_positive("min_snr", self.min_snr, 1e6)
+        require_positive("shadow_snr", self.shadow_snr, 1e6)
         require(0 < self.second_peak_ratio <= 1, "second_peak_ratio", "be in (0, 1]", self.second_peak_ratio)
         require(self.width_ratio > 1, "width_ratio", "be above 1", self.width_ratio)
-        require(
-            self.saturated_level is None or self.saturated_level > 0,
-            "saturated_level",
-            "be positive or None",
-            self.saturated_level,
-        )
-        require(self.max_gap_px > 0, "max_gap_px", "be positive [camera px]", self.max_gap_px)
+        if self.saturated_level is not None:
+            require_whole("saturated_level", self.saturated_level, 1, 65535)
+        require_positive("max_gap_px", self.max_gap_px, 1e5, "camera px")
 
     @property
     def window(self) -> int:
@@ -124,18 +119,6 @@ def still_scene(capture: Capture, settings: SweepSettings) -> Scene:
     require(white.dtype.kind == "u", "white", "be of type uint8 or uint16", white.dtype)
     require(black.dtype == white.dtype, "black", f"have white's type {white.dtype}", black.dtype)
     return Scene(white, black, settings.saturated_level or int(np.iinfo(white.dtype).max))
-
-
-def grey_frames(frames: Frames, scene: Scene, name: str) -> Iterator[Array]:
-    """Yield each frame once, in order, checked against the still scene and as grey levels."""
-    count = 0
-    for i, frame in enumerate(frames):
-        grey = grey_levels(frame, f"{name}[{i}]")
-        require(grey.shape == scene.white.shape, f"{name}[{i}]", f"have white's shape {scene.white.shape}", grey.shape)
-        require(grey.dtype == scene.white.dtype, f"{name}[{i}]", f"have white's type {scene.white.dtype}", grey.dtype)
-        count += 1
-        yield grey
-    require(count == len(frames), name, f"yield its {len(frames)} frames", count)
 
 
 def dark_noise(frames: Array, scene: Scene) -> float:

@@ -8,6 +8,8 @@ from deskew.acquisition.matches import Matches, match
 from deskew.types import Calibration, Correspondence, Floats
 
 
+# Devices in one place have no epipolar lines: their depths come out as NaN, which is a result and no warning.
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def solve_depth(matches: Matches) -> Floats:
     """Camera z of each match, (N,) [mm]; NaN where the rays meet behind a device or not at all.
 

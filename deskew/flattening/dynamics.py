@@ -191,6 +191,8 @@ def _outcome(run: Run, springs: Springs, plane: Plane, still: bool) -> tuple[Sta
     folded = folded_quads(run.x[:2].T.reshape(*springs.grid, 2))
     if folded and (still or z < plane.eps):
         return Status.FOLDED, _REMEDY[Status.FOLDED].format(folded=folded)
+    if not still and plane.literal and run.counts[REJECTED] > 0:
+        return Status.LOCKED, _COLLAPSED.format(dt=run.clock[0], steps=run.counts[STEPS])
     if not still:
         return Status.LOCKED, _UNSETTLED.format(steps=run.counts[STEPS])
     if z >= plane.eps:

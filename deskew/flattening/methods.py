@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from deskew.errors import DeskewError, InputError, StepError, require
+from deskew.errors import DeskewError, InputError, StepError, in_one_line, require
 from deskew.flattening.dynamics import settle
 from deskew.flattening.integrators import INTEGRATORS
 from deskew.flattening.settings import particle_settings
-from deskew.types import Flattened, Sheet
+from deskew.types import Flattened, Sheet, Status
 
 Flattener = Callable[..., Flattened]
 
@@ -46,15 +46,17 @@ def find_method(name: str) -> Flattener:
     InputError
         If there is no such method.
     """
+    known = f"one of {', '.join(METHODS)}, or package.module:function"
+    require(isinstance(name, str), "method", f"be {known}", repr(name))
     if name in METHODS:
         return METHODS[name]
     module_name, colon, attribute = name.partition(":")
-    known = f"one of {', '.join(METHODS)}, or package.module:function"
-    require(bool(colon and module_name and attribute), "method", f"be {known}", repr(name))
+    absolute = bool(colon and attribute) and all(module_name.split("."))
+    require(absolute, "method", f"be {known}", repr(name))
     try:
         found: Any = getattr(import_module(module_name), attribute, None)
-    except ImportError as error:
-        raise InputError(f"`method` must be {known}, got {name!r}: {error}.") from error
+    except (Exception, SystemExit) as error:  # whatever a module does when it is imported, exiting included
+        raise InputError(f"`method` must be {known}, got {name!r}: {in_one_line(error)}.") from error
     require(callable(found), "method", f"name a function in {module_name}", repr(name))
     function: Flattener = found
     return function
@@ -82,20 +84,34 @@ def flatten(sheet: Sheet, *, method: str = "paper_euler", **settings: object) ->
     InputError
         If the method or a setting is unknown or out of range, or the sheet does not suit the method.
     StepError
-        If a method from outside raises, or returns something else than a `Flattened` of the sheet's shape.
+        If a method from outside raises or exits, or returns something else than a `Flattened` of the sheet's shape,
+        finite unless its status is `DIVERGED`.
     """
     function = find_method(method)
     try:
         result = function(sheet, **settings)
     except DeskewError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if method in METHODS:
             raise
-        raise StepError(f"Flattening by `{method}` failed: {type(error).__name__}: {error}.") from error
-    if not isinstance(result, Flattened):
-        raise StepError(f"Flattening by `{method}` must return a Flattened, got {type(result).__name__}.")
-    shape = np.shape(result.vertices)
-    if shape != sheet.vertices.shape:
-        raise StepError(f"Flattening by `{method}` must keep the shape {sheet.vertices.shape}, got {shape}.")
+        raise StepError(f"Flattening by `{method}` failed: {in_one_line(error)}.") from error
+    _require_result(result, sheet, method)
     return result
+
+
+def _require_result(result: Any, sheet: Sheet, method: str) -> None:
+    """Raise a StepError unless a method returned what it must; nothing about it is taken for granted."""
+
+    def must(holds: bool, what: str, got: object) -> None:
+        if not holds:
+            raise StepError(f"Flattening by `{method}` must {what}, got {got}.")
+
+    must(isinstance(result, Flattened), "return a Flattened", type(result).__name__)
+    vertices, status = result.vertices, result.status
+    real = isinstance(vertices, np.ndarray) and vertices.dtype.kind in "fiu"
+    must(real, "return vertices as an array of real numbers", getattr(vertices, "dtype", type(vertices).__name__))
+    must(vertices.shape == sheet.vertices.shape, f"keep the shape {sheet.vertices.shape}", vertices.shape)
+    must(isinstance(status, Status), "return a Status", repr(status))
+    finite = status is Status.DIVERGED or bool(np.isfinite(vertices).all())
+    must(finite, "return finite vertices unless it diverged", f"{status} with NaN or infinity")

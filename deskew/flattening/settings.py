@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import isfinite
 
-from deskew.errors import require
+from deskew.errors import require, require_whole
 from deskew.flattening.contact import READINGS
+
+# Beyond these the arithmetic overflows or the step vanishes, long before anything is physical.
+SMALLEST, LARGEST = 1e-9, 1e12
+MAX_STEPS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +17,8 @@ class ParticleSettings:
     """The paper's constants. It prints k_r alone; the others default to what its 45x45 meshes need.
 
     None means "chosen from the stiffness, the mass and the mesh", so that a stiffer spring, a heavier particle or a
-    finer mesh still flattens in about as many steps. The chosen values are among the result's counters.
+    finer mesh still flattens in about as many steps. The chosen values are among the result's counters. Positive ones
+    lie in [1e-9, 1e12], the others in [0, 1e12].
 
     Attributes
     ----------
@@ -42,7 +46,7 @@ class ParticleSettings:
     eps_mm : float
         Height under which a particle touches the plane [mm], > 0.
     max_steps : int
-        Steps after which the sheet counts as locked, >= 1.
+        Steps after which the sheet counts as locked, in [1, 1e9].
     halving : str
         Reading of the paper's step halving, "working" or "literal" (see `contact`).
     """
@@ -64,19 +68,21 @@ class ParticleSettings:
             value = getattr(self, name)
             if name == "dt" and value is None:
                 continue
-            require(_is_number(value) and value > 0, name, f"be a positive, finite number [{unit}]", repr(value))
+            allowed = _is_number(value) and SMALLEST <= value <= LARGEST
+            require(allowed, name, f"be a number in [{SMALLEST:g}, {LARGEST:g}] [{unit}]", repr(value))
         for name, unit in (("k_d", "kg/s"), ("gravity", "mm/s^2"), ("weak_gravity", "mm/s^2"), ("drag", "kg/s")):
             value = getattr(self, name)
             if value is not None:
-                require(_is_number(value) and value >= 0, name, f"be a finite number >= 0 [{unit}]", repr(value))
+                allowed = _is_number(value) and 0 <= value <= LARGEST
+                require(allowed, name, f"be a number in [0, {LARGEST:g}] [{unit}]", repr(value))
         require(_is_number(self.k_r) and 0 <= self.k_r <= 1, "k_r", "be in [0, 1]", repr(self.k_r))
-        whole = isinstance(self.max_steps, int) and not isinstance(self.max_steps, bool)
-        require(whole and self.max_steps >= 1, "max_steps", "be a whole number >= 1", repr(self.max_steps))
+        require_whole("max_steps", self.max_steps, 1, MAX_STEPS)
         require(self.halving in READINGS, "halving", f"be one of {', '.join(READINGS)}", repr(self.halving))
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    """Whether `value` is a number at all; its range is asked for where it is known, which NaN is outside of."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def particle_settings(**values: object) -> ParticleSettings:

@@ -13,12 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from deskew.errors import require
+from deskew.flattening.settings import LARGEST, SMALLEST
 from deskew.types import Array, Floats, Sheet
 
 # Provot's names: two families of structural springs and two of shear springs.
 FAMILIES = ("structural_row", "structural_column", "shear_down", "shear_up")
 TAILS = ((0, 0), (0, 0), (0, 0), (1, 0))
 HEADS = ((0, 1), (1, 0), (1, 1), (0, 1))
+# Squares and energies of lengths beyond these overflow or vanish.
+SHORTEST_MM, FARTHEST_MM = 1e-9, 1e9
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,12 +164,18 @@ def chord_springs(sheet: Sheet, k_s: float) -> Springs:
     Raises
     ------
     InputError
-        If the sheet is not a grid, or two joined vertices coincide.
+        If the sheet is not a grid, two joined vertices coincide, or a length or a stiffness is beyond all measure.
     """
     require(sheet.faces is None, "sheet", "be an (R, C, 3) grid for a particle system", "a triangle mesh")
     rows, columns = sheet.vertices.shape[:2]
+    farthest = float(np.abs(sheet.vertices).max())
+    require(farthest < FARTHEST_MM, "vertices", f"lie within {FARTHEST_MM:g} mm of the origin", f"{farthest:g} mm")
+    if sheet.stiffness is not None:
+        low, high = float(sheet.stiffness.min()), float(sheet.stiffness.max())
+        sound = low >= SMALLEST and high <= LARGEST
+        require(sound, "stiffness", f"be in [{SMALLEST:g}, {LARGEST:g}] [kg/s^2]", f"{low:g} to {high:g}")
     rest = chord_lengths(sheet.vertices)
     constants = spring_constants((rows, columns), k_s, sheet.stiffness)
-    coincident = int(((rest == 0) & (constants > 0)).sum())
+    coincident = int(((rest < SHORTEST_MM) & (constants > 0)).sum())
     require(coincident == 0, "vertices", "be distinct along every edge and diagonal", f"{coincident} coincident pairs")
     return Springs(rest, constants)

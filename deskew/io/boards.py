@@ -15,6 +15,7 @@ from deskew.types import Board, Capture, PatternKind, Size
 
 BOARD_VERSION = 1
 MAX_CORNERS = 1000
+SQUARE_RANGE = (1e-3, 1e6)  # in the board's own unit: beyond it a fit in single precision overflows or vanishes
 
 _UNIT = re.compile(r"[A-Za-z\u00b5]{1,16}")
 
@@ -63,7 +64,10 @@ def read_board(folder: Path) -> tuple[Board, list[Capture]]:
     corners = fields.pair("inner_corners", 3, MAX_CORNERS)
     unit = fields.word("unit")
     require(bool(_UNIT.fullmatch(unit)), f"{path}: unit", "be 1 to 16 letters, such as mm", shown(unit))
-    board = Board(corners, fields.positive("square"), unit)
+    square = fields.positive("square")
+    sound = SQUARE_RANGE[0] <= square <= SQUARE_RANGE[1]
+    require(sound, f"{path}: square", f"be in [{SQUARE_RANGE[0]:g}, {SQUARE_RANGE[1]:g}]", shown(square))
+    board = Board(corners, square, unit)
     poses = [read_capture(pose) for pose in _pose_folders(folder, "pose_", 2)]
     for i, pose in enumerate(poses):
         for name in ("camera_size", "projector_size"):
@@ -91,6 +95,8 @@ def write_board(board: Board, captures: Iterable[Capture], folder: Path) -> None
     StepError
         If the file system refuses.
     """
+    sound = SQUARE_RANGE[0] <= board.square <= SQUARE_RANGE[1]
+    require(sound, "square", f"be in [{SQUARE_RANGE[0]:g}, {SQUARE_RANGE[1]:g}]", board.square)
     require(bool(_UNIT.fullmatch(board.unit)), "unit", "be 1 to 16 letters, such as mm", shown(board.unit))
     with replacing_folder(Path(folder)) as new:
         text = (

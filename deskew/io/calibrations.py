@@ -28,6 +28,7 @@ def _device(fields: Fields) -> Pinhole:
     K = fields.array("K", (3, 3))
     upper = K[1, 0] == 0 and K[2].tolist() == [0, 0, 1]
     require(upper, f"{fields.name}: K", "be upper triangular with a last row of 0, 0, 1", shown(K.tolist()))
+    require(K[0, 1] == 0, f"{fields.name}: K", "have no skew", K[0, 1])  # OpenCV's camera knows none
     rest = (fields.array("distortion", (5,)), fields.array("R", (3, 3)), fields.array("t", (3,)))
     try:
         return Pinhole(fields.pair("size_px"), K, *rest)

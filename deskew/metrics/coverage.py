@@ -15,6 +15,8 @@ from deskew.types import Array, Floats
 
 # Cells are sampled at their centres: the figure is exact to half a cell along the border, .08 % of a letter page.
 CELL_MM = 0.1
+LONGEST_MM = 1e5
+LARGEST_MM2 = 1e7  # ten sheets of A0: a thousand million cells
 # Neighbouring pixels farther apart on the page than this many usual distances do not show what lies between them.
 TEAR = 4.0
 
@@ -136,7 +138,10 @@ def page_coverage(backward_map: Array, true_uv: Floats, page_size_mm: tuple[floa
         In [0, 1].
     """
     size = np.asarray(page_size_mm, dtype=np.float64)
-    require(size.shape == (2,) and bool((size > 0).all()), "page_size_mm", "be two positive lengths", page_size_mm)
+    sound = size.shape == (2,) and bool(((size > 0) & (size <= LONGEST_MM)).all())
+    require(sound, "page_size_mm", f"be two positive lengths up to {LONGEST_MM:g} mm", page_size_mm)
+    area = float(size.prod())
+    require(area <= LARGEST_MM2, "page_size_mm", f"span at most {LARGEST_MM2:g} mm^2", f"{area:g} mm^2")
     drawn = np.asarray(np.isfinite(backward_map).all(axis=-1))
     known = drawn & np.asarray(np.isfinite(true_uv).all(axis=-1))
     counts = np.maximum(1, np.ceil(size / CELL_MM)).astype(int)

@@ -13,6 +13,9 @@ from deskew.restoration.quads import backward_quads
 from deskew.restoration.sampling import sample_image
 from deskew.types import Array, Flattened, Floats, Pinhole, Restoration, Sheet, Status
 
+FARTHEST_MM = 1e9  # pixels of vertices farther away would overflow
+NEAREST_MM = 1e-3
+
 
 def view_camera(camera: Pinhole, scale: float = 1.0) -> Pinhole:
     """Return the ideal camera that control and restored images are seen through.
@@ -106,7 +109,7 @@ def texture_quads(image: Array, camera: Pinhole, sheet: Sheet, flattened: Flatte
     Raises
     ------
     InputError
-        If the sheet is no grid, or the two disagree in shape.
+        If the sheet is no grid, the two disagree in shape, or one lies behind the camera or beyond all measure.
     StepError
         If the flattened page does not lie in view of the camera.
     """
@@ -116,8 +119,8 @@ def texture_quads(image: Array, camera: Pinhole, sheet: Sheet, flattened: Flatte
     finite = bool(np.isfinite(flattened.vertices).all())
     require(finite, "flattened", "have finite vertices", f"status {Status(flattened.status)} with NaN or infinity")
     view, ideal = view_camera(camera, scale), projection.ideal(camera)
-    new = projection.project(view, flattened.vertices)
-    source = backward_quads(new, projection.project(ideal, sheet.vertices), view.size)
+    new = _pixels(view, flattened.vertices, "flattened")
+    source = backward_quads(new, _pixels(ideal, sheet.vertices, "sheet"), view.size)
     backward = _through_lens(camera, ideal, source)
     if not np.isfinite(backward[..., 0]).any():
         raise StepError(
@@ -126,6 +129,15 @@ def texture_quads(image: Array, camera: Pinhole, sheet: Sheet, flattened: Flatte
         )
     picture = sample_image(image, backward, camera.size, 1.0 / scale)
     return Restoration(picture, backward, view, flattened)
+
+
+def _pixels(view: Pinhole, vertices: Floats, name: str) -> Floats:
+    """Project a sheet that lies in front of the camera; one behind it would be seen upside down."""
+    farthest = float(np.abs(vertices).max())
+    require(farthest < FARTHEST_MM, name, f"lie within {FARTHEST_MM:g} mm of the origin", f"{farthest:g} mm")
+    nearest = float((vertices @ view.R[2] + view.t[2]).min())
+    require(nearest >= NEAREST_MM, name, f"lie at least {NEAREST_MM:g} mm in front of the camera", f"{nearest:g} mm")
+    return projection.project(view, vertices)
 
 
 def _extent(pixels: Floats) -> str:

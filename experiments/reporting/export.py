@@ -1,16 +1,18 @@
-"""Everything that a run leaves beside its store, each file whole or not at all."""
+"""Everything that a run leaves beside its store, all of it or nothing."""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from io import StringIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from deskew.io import write_bytes
+from deskew.errors import StepError, require
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.layout import Layout
 from experiments.reporting.tables import table
@@ -51,9 +53,39 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
         shown |= {name.format(trial=row.trial) for _, name in montage.lines for row in results.rows}
     alone = {name: png for name, png in results.pictures.items() if name not in shown}
     files |= {f"figures/{name}.png": png for name, png in alone.items()}
-    for name, content in files.items():
-        (out / name).parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(content, out / name)
+    _replace_all(out, files)
+
+
+def require_targets(out: Path, layout: Layout) -> None:
+    """Raise an InputError where a report could not be written under `out`: to be asked before the trials."""
+    drawn = [*(plot.name for plot in layout.plots), *(montage.name for montage in layout.montages)]
+    names = ["results.csv", "timings.csv", "table.md", "run.json", *(f"figures/{name}.png" for name in drawn)]
+    _require_replaceable(out, names)
+
+
+def _require_replaceable(out: Path, names: Iterable[str]) -> None:
+    figures = out / "figures"
+    kind = "a folder" if figures.is_dir() else "a file"
+    usable = not os.path.lexists(figures) or (figures.is_dir() and os.access(figures, os.W_OK))
+    require(usable, str(figures), "be a writable folder or not there", kind)
+    for name in names:
+        require(not (out / name).is_dir(), str(out / name), "be a file or not there", "a folder")
+
+
+def _replace_all(out: Path, files: Mapping[str, bytes]) -> None:
+    """Write every file beside the old ones first, then rename: a full disk leaves the old report as it was."""
+    _require_replaceable(out, files)
+    try:
+        with TemporaryDirectory(prefix=".report.", dir=out, ignore_cleanup_errors=True) as scratch:
+            for folder in (Path(scratch), out):
+                (folder / "figures").mkdir(exist_ok=True)
+            for name, content in files.items():
+                (Path(scratch) / name).write_bytes(content)
+            for name in files:
+                (Path(scratch) / name).replace(out / name)
+    except OSError as error:
+        reason = f"{error.strerror or error}; choose a writable folder with room, finished trials are kept"
+        raise StepError(f"Writing the report under `{out}` failed: {reason}.") from error
 
 
 def csv_text(rows: Sequence[Row]) -> str:

@@ -73,7 +73,7 @@ def picture_wall(montage: Montage, pictures: Mapping[str, bytes], n_trials_max: 
             if column == 0:
                 axes.set_ylabel(heading, fontsize=9)
             if line == 0:
-                axes.set_title(f"page {trial + 1}", fontsize=9)
+                axes.set_title(f"{montage.item} {trial + 1}", fontsize=9)
     return figure
 
 

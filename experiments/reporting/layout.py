@@ -71,10 +71,13 @@ class Montage:
         Written as `figures/NAME.png`.
     lines : tuple of (heading, picture)
         The trial's number stands for "{trial}" in the picture's name.
+    item : str
+        What a trial shows: "page 1", ...
     """
 
     name: str
     lines: tuple[tuple[str, str], ...]
+    item: str = "page"
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,12 +12,12 @@ from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import acquisition, metrics, pipeline, restoration
 from deskew.acquisition import SweepSettings
 from deskew.errors import require
-from deskew.io import read_arrays
 from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan
 from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
+from experiments.studies.given_sheets import read_sheet
 from experiments.studies.methods import require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.study import Study
@@ -94,7 +94,7 @@ class CornerDistance(Study):
         n = len(config.sheet.paths)
         require(n == 0 or config.trials <= n, "trials", f"be at most {n}, one a file of sheet.paths", config.trials)
         for path in config.sheet.paths[: config.trials]:
-            _read_sheet(path)
+            read_sheet(Path(path), Checkerboard().page_size_mm)
         return Study.plan(self, config)
 
     def inputs(self, config: Config) -> dict[str, Path]:
@@ -223,13 +223,4 @@ class _Trial:
 def _sheet(config: Config, key: TrialKey, rng: np.random.Generator) -> TrueSheet:
     if not config.sheet.paths:
         return data_synth.crumpled(rng, slope_p90_deg=config.sheet.slope_p90_deg)
-    return _read_sheet(config.sheet.paths[key.trial])
-
-
-def _read_sheet(path: str) -> TrueSheet:
-    arrays = read_arrays(Path(path))
-    require({"V", "F"} <= set(arrays), path, "hold V (h, w, 3) and F (h, w, 2) [mm]", ", ".join(sorted(arrays)))
-    sheet, page = TrueSheet(arrays["V"], arrays["F"]), Checkerboard().page_size_mm
-    fits = bool(np.allclose(sheet.page_size_mm, page, atol=0.5))
-    require(fits, f"{path}: F", f"span the page of {page[0]:g} x {page[1]:g} mm", sheet.page_size_mm)
-    return sheet
+    return read_sheet(Path(config.sheet.paths[key.trial]), Checkerboard().page_size_mm)

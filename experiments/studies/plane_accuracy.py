@@ -10,9 +10,11 @@ import data_synth
 from data_synth import Blank, Checkerboard, Page
 from deskew import acquisition, metrics, pipeline, restoration
 from deskew.acquisition import SweepSettings
+from deskew.errors import require
 from experiments.reporting import Column, Layout, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
+from experiments.studies.methods import require_methods
 from experiments.studies.scanned import scanned_points
 from experiments.studies.study import Study
 from experiments.studies.views import seen_corners
@@ -55,6 +57,12 @@ class PlaneAccuracy(Study):
         ),
         (Plot("plane_mean_abs_mm", "plane_mean_abs_mm", "mean deviation from the best-fit plane [mm]", 0.31),),
     )
+
+    def plan(self, config: Config) -> list[TrialKey]:
+        """Plan one trial an orientation."""
+        require_methods(config)
+        require(not config.sheet.paths, "sheet.paths", "be left out: this experiment scans planes", config.sheet.paths)
+        return Study.plan(self, config)
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials."""

@@ -78,6 +78,7 @@ class RealBoards(Study):
             Montage(
                 "boards",
                 (("as the camera sees it", "board_{trial}_seen"), ("restored, from above", "board_{trial}_restored")),
+                item="board",
             ),
         ),
     )
@@ -86,6 +87,7 @@ class RealBoards(Study):
         """Plan one trial a board left out, and one for all boards."""
         require_methods(config)
         require(config.trials <= N_BOARDS, "trials", f"be at most {N_BOARDS}, one a board", config.trials)
+        require(not config.sheet.paths, "sheet.paths", "be left out: this experiment scans boards", config.sheet.paths)
         path = config.real_boards.path
         if path is None:
             raise AbsentError("real_boards.path names no folder; README says where the captures are to be had")

@@ -13,6 +13,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Protocol
@@ -80,7 +81,9 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         here, there = context.Pipe()
         process = context.Process(target=_serve, args=(there, run), daemon=True)
-        with _environment(dict.fromkeys(_ONE_THREAD, "1")):
+        # Its start unblocks signals; it must be behind us.
+        resource_tracker.ensure_running()
+        with _environment(dict.fromkeys(_ONE_THREAD, "1")), _interrupts_held():
             process.start()
         # The worker's end must be closed here, or its death would not end the pipe.
         there.close()
@@ -171,6 +174,16 @@ def _environment(values: dict[str, str]) -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold ctrl-C back until the block is over; a process started in it never gets one, also while it imports."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(connection: Connection, run: Run) -> None:

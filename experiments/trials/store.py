@@ -5,11 +5,14 @@ Every trial is one transaction, so a killed run keeps whole trials and nothing e
 
 from __future__ import annotations
 
+import os
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import astuple
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from deskew.errors import InputError, StepError
 from experiments.trials.record import Outcome
@@ -52,20 +55,19 @@ class Store:
     def __init__(self, folder: Path, fingerprint: str) -> None:
         self.fingerprint = fingerprint
         self._path = folder / NAME
-        self._made = [path for path in (folder, *folder.parents) if not path.exists()]
+        self._made: list[Path] = []
         try:
+            # os.path answers for names that pathlib raises on.
+            places = (self._path, folder, *folder.parents)
+            self._made = [path for path in places if not os.path.lexists(path)]
             folder.mkdir(parents=True, exist_ok=True)
-            self._connection = sqlite3.connect(self._path, timeout=0.2)
-            # One driver at a time: the lock lasts as long as the connection.
-            self._connection.execute("PRAGMA locking_mode = EXCLUSIVE")
-            self._connection.execute("PRAGMA foreign_keys = ON")
-            version = self._connection.execute("PRAGMA user_version").fetchone()[0]
-            if version not in (0, _VERSION):
-                raise sqlite3.DatabaseError(f"its version is {version}, this program writes {_VERSION}")
-            self._connection.executescript(f"BEGIN EXCLUSIVE; {_SCHEMA} PRAGMA user_version = {_VERSION}; COMMIT;")
-        except OSError as error:
-            raise InputError(f"`out` must be a folder that can be written, got {folder}: {error.strerror}.") from error
+            self._connection = _opened(self._path)
+        except (OSError, ValueError) as error:
+            self._leave_nothing()
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise InputError(f"`out` must be a folder that can be written, got {folder}: {reason}.") from error
         except sqlite3.OperationalError as error:
+            self._leave_nothing()
             raise InputError(
                 f"`out` must be a free, writable folder, got {folder}, whose store says: {error}."
             ) from error
@@ -78,27 +80,50 @@ class Store:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        empty = self._connection.execute("SELECT COUNT(*) FROM trials").fetchone()[0] == 0
+        empty = False
+        with suppress(sqlite3.Error):
+            empty = self._connection.execute("SELECT COUNT(*) FROM trials").fetchone()[0] == 0
         self._connection.close()
         if empty:
             self._path.unlink(missing_ok=True)
-            for folder in self._made:
-                if not any(folder.iterdir()):
-                    folder.rmdir()
+            self._leave_nothing()
+
+    def _leave_nothing(self) -> None:
+        """Remove what this store made, as far as nobody else put something there."""
+        for path in self._made:
+            with suppress(OSError, ValueError):
+                if path.is_dir():
+                    path.rmdir()
+                else:
+                    path.unlink(missing_ok=True)
+
+    @contextmanager
+    def _as_step(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.IntegrityError:
+            raise  # a study's fault, not the disk's
+        except sqlite3.DatabaseError as error:
+            remedy = "finished trials are kept; make room or mend it, and run the same command again"
+            raise StepError(f"Keeping results in `{self._path}` failed: {error}; {remedy}.") from error
+
+    def _read(self, query: str, *values: str) -> list[tuple[Any, ...]]:
+        with self._as_step():
+            return self._connection.execute(query, values).fetchall()
 
     def forget_lost(self) -> None:
         """Drop the trials whose worker died, so that this run tries them again."""
-        with self._connection:
+        with self._as_step(), self._connection:
             self._connection.execute("DELETE FROM trials WHERE lost AND fingerprint = ?", (self.fingerprint,))
 
     def finished(self) -> set[TrialKey]:
         """Return the keys of the trials that need not be run again."""
         query = f"SELECT {_KEY} FROM trials WHERE fingerprint = ?"
-        return {TrialKey(*cells) for cells in self._connection.execute(query, (self.fingerprint,))}
+        return {TrialKey(*cells) for cells in self._read(query, self.fingerprint)}
 
     def record(self, key: TrialKey, outcome: Outcome) -> bool:
         """Keep a finished trial; return False, and change nothing, if it is already kept."""
-        with self._connection:
+        with self._as_step(), self._connection:
             insert = f"INSERT OR IGNORE INTO trials (fingerprint, {_KEY}, lost) VALUES (?, ?, ?, ?, ?, ?, ?)"
             cursor = self._connection.execute(insert, (self.fingerprint, *astuple(key), outcome.lost))
             if cursor.rowcount == 0:
@@ -132,7 +157,7 @@ class Store:
         )
         wanted = set(keys)
         found: dict[tuple[object, ...], Row] = {}
-        for *cells, condition, method in self._connection.execute(query, (self.fingerprint, kind)):
+        for *cells, condition, method in self._read(query, self.fingerprint, kind):
             row = Row(*cells)
             if TrialKey(row.experiment, condition, method, row.trial, row.seed) not in wanted:
                 continue
@@ -153,7 +178,7 @@ class Store:
         wanted = set(keys)
         return sorted(
             Failure(condition, method, cells[3], cells[4], reason)
-            for *cells, condition, method, reason in self._connection.execute(query, (self.fingerprint,))
+            for *cells, condition, method, reason in self._read(query, self.fingerprint)
             if TrialKey(*cells) in wanted
         )
 
@@ -161,5 +186,26 @@ class Store:
         """Return the PNG bytes of the given trials' pictures by name."""
         query = f"SELECT {_KEY}, name, png FROM pictures JOIN trials USING (id) WHERE fingerprint = ? ORDER BY name"
         wanted = set(keys)
-        found = self._connection.execute(query, (self.fingerprint,))
+        found = self._read(query, self.fingerprint)
         return {name: png for *cells, name, png in found if TrialKey(*cells) in wanted}
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    """Open a store or make one; a file of somebody else is closed as it was."""
+    connection = sqlite3.connect(path, timeout=0.2)
+    try:
+        # One driver at a time: the lock lasts as long as the connection.
+        connection.execute("PRAGMA locking_mode = EXCLUSIVE")
+        connection.execute("PRAGMA foreign_keys = ON")
+        version = connection.execute("PRAGMA user_version").fetchone()[0]
+        if version not in (0, _VERSION):
+            raise sqlite3.DatabaseError(f"its version is {version}, this program writes {_VERSION}")
+        columns = {name for (name,) in connection.execute("SELECT name FROM pragma_table_info('trials')")}
+        n_tables = connection.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]
+        if n_tables and (version == 0 or not {"fingerprint", "lost"} <= columns):
+            raise sqlite3.DatabaseError("it holds tables of another program")
+        connection.executescript(f"BEGIN EXCLUSIVE; {_SCHEMA} PRAGMA user_version = {_VERSION}; COMMIT;")
+    except sqlite3.Error:
+        connection.close()
+        raise
+    return connection

@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from deskew.acquisition.bundle import Bundle, on_board
-from deskew.acquisition.calibration import BoardView, board_points, calibrate
+from deskew.acquisition.calibration import BoardView, board_points, calibrate, view_board
 from deskew.errors import InputError, StepError
 from deskew.projection import centre, project
-from deskew.types import Board, Pinhole
+from deskew.types import Board, Capture, Correspondence, PatternKind, Pinhole
 
 BOARD = Board((9, 6), 20.0)
 CAMERA = Pinhole(
@@ -119,3 +119,34 @@ def test_views_of_two_cameras_are_refused():
     views[3] = replace(views[3], camera_size=(800, 600))
     with pytest.raises(InputError, match="`views` must be of one camera"):
         calibrate(BOARD, views)
+
+
+def test_views_without_the_boards_corners_are_refused():
+    views = _views()
+    views[1] = replace(views[1], corners=views[1].corners[:-1])
+    with pytest.raises(InputError, match=r"`views\[1\]\.corners` must have shape"):
+        calibrate(BOARD, views)
+
+
+@pytest.mark.parametrize("square", [1e300, 1e-300])
+def test_a_fit_that_opencv_refuses_is_a_failed_step(square):
+    with np.errstate(over="ignore"), pytest.raises(StepError, match="calibration: the camera could not be fitted"):
+        calibrate(replace(BOARD, square=square), _views())
+
+
+@pytest.mark.parametrize("shape", [(5.5, 4), (2, 3), (5,), (1001, 4)])
+def test_a_board_counts_its_corners_in_whole_numbers(shape):
+    with pytest.raises(InputError, match=r"`shape` must be \(nx, ny\)"):
+        Board(shape, 25.0)
+
+
+@pytest.mark.parametrize("n_pixels_max", [99, -1, 100.5])
+def test_a_board_view_keeps_enough_pixels_of_its_own_capture(n_pixels_max):
+    image, nothing = np.full((48, 64), 9, np.uint8), np.full((48, 64), np.nan)
+    capture = Capture(image, image, (2, 2), PatternKind.GRAY_CODE, [image] * 2, [image] * 2)
+    seen = Correspondence(nothing, nothing, np.full((48, 64), 3, np.uint8))
+    with pytest.raises(InputError, match="`n_pixels_max` must be a whole number"):
+        view_board(BOARD, capture, seen, n_pixels_max)
+    smaller = Correspondence(nothing[1:], nothing[1:], seen.reason[1:])
+    with pytest.raises(InputError, match=r"`correspondence` must have the capture's shape \(48, 64\), got \(47, 64\)"):
+        view_board(BOARD, capture, smaller)

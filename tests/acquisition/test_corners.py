@@ -122,5 +122,38 @@ def test_wrong_shapes_are_refused():
         refine_saddle(np.zeros((20, 20)), np.zeros(2))
     with pytest.raises(InputError, match="`image` must be"):
         refine_saddle(np.zeros((20, 20, 3, 1)), np.zeros((1, 2)))
-    with pytest.raises(InputError, match="`sigma_px` must be positive"):
+    with pytest.raises(InputError, match=r"`sigma_px` must be in \(0, 100\]"):
         refine_saddle(np.zeros((20, 20)), np.zeros((1, 2)), sigma_px=0.0)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (5,), (5.5, 4), 5, (1001, 4)])
+def test_a_board_of_no_sound_shape_is_refused(shape):
+    with pytest.raises(InputError, match=r"`shape` must be \(nx, ny\) of at least 3 inner corners"):
+        find_board(np.zeros((64, 64)), shape)
+
+
+@pytest.mark.parametrize("side", [1, 2, 5, 15])
+def test_an_image_too_small_for_a_board_is_refused(side):
+    with pytest.raises(InputError, match="`image` must be at least 16 x 16 pixels"):
+        find_board(np.zeros((side, 64)), (5, 4))
+
+
+def test_a_small_image_without_a_board_is_a_failed_step():
+    with pytest.raises(StepError, match="no board of 5 x 4"):
+        find_board(np.zeros((16, 16)), (5, 4))
+
+
+@pytest.mark.parametrize("refined", [refine_saddle, refine_kitchen_rosenfeld, kitchen_rosenfeld_peaks])
+def test_an_image_without_pixels_has_no_corners_to_refine(refined):
+    with pytest.raises(InputError, match="`image` must have at least 1 pixel"):
+        refined(np.zeros((0, 0)), np.zeros((1, 2)))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, 1e9, "4"])
+def test_windows_out_of_range_are_refused(value):
+    seeds = np.zeros((1, 2))
+    for name in ("search_px", "sigma_px"):
+        with pytest.raises(InputError, match=rf"`{name}` must be in \(0, 100\] \[px\]"):
+            refine_saddle(np.zeros((20, 20)), seeds, **{name: value})
+    with pytest.raises(InputError, match=r"`radius_px` must be a whole number in \[1, 100\]"):
+        refine_kitchen_rosenfeld(np.zeros((20, 20)), seeds, radius_px=value)

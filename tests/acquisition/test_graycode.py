@@ -129,6 +129,10 @@ def test_codes_beyond_the_projector_are_refused():
         ("gap_max_px", 1),
         ("n_dropped_max", -1),
         ("ink_slope_max", 0.0),
+        ("shadow_snr", float("inf")),
+        ("gap_max_px", 2.5),
+        ("n_dropped_max", 1.5),
+        ("subpixel", "x"),
     ],
 )
 def test_settings_out_of_range_are_refused(name, value):

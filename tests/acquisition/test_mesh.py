@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -150,9 +152,9 @@ def test_page_without_depth_is_a_failed_step() -> None:
         page_sheet(depth_map(plane_depth(), nothing), straight_outline(CORNERS))
 
 
-@pytest.mark.parametrize("shape", [(1, 45), (45, 1), (0, 0)])
-def test_mesh_under_two_by_two_is_refused(shape: tuple[int, int]) -> None:
-    with pytest.raises(InputError, match=r"`shape` must be \(rows, columns\) of at least 2 x 2 vertices, got"):
+@pytest.mark.parametrize("shape", [(1, 45), (45, 1), (0, 0), (4.5, 4), (3, 1001), (3,), 5, (True, 3)])
+def test_mesh_of_no_sound_shape_is_refused(shape: Any) -> None:
+    with pytest.raises(InputError, match=r"`shape` must be \(rows, columns\) of at least 2 x 2 vertices, at most 1000"):
         page_sheet(depth_map(plane_depth()), straight_outline(CORNERS), shape)
 
 

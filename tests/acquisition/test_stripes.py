@@ -284,9 +284,9 @@ def test_a_dark_scene_is_a_failed_step_with_a_remedy():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"mode": "both"}, {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"min_snr": 0.0},
-        {"shadow_snr": -1.0}, {"second_peak_ratio": 0.0}, {"second_peak_ratio": 1.1}, {"width_ratio": 1.0},
-        {"saturated_level": 0}, {"max_gap_px": 0.0},
+        {"mode": "both"}, {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"half_width": 2.5},
+        {"min_snr": 0.0}, {"shadow_snr": -1.0}, {"second_peak_ratio": 0.0}, {"second_peak_ratio": 1.1},
+        {"width_ratio": 1.0}, {"saturated_level": 0}, {"max_gap_px": 0.0},
     ],
 )  # fmt: skip
 def test_settings_out_of_range_are_refused_by_name(wrong):

@@ -1,11 +1,17 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
+from deskew import pipeline
+from deskew.acquisition import require_same_devices
+from deskew.acquisition.epipolar import cull_epipolar
 from deskew.acquisition.triangulation import triangulate
+from deskew.errors import InputError
 from deskew.projection import centre, pixel_grid, project, rays, undistort
-from deskew.types import Correspondence, Reason
+from deskew.types import Capture, Correspondence, PatternKind, Reason
 from tests.acquisition.stripe_scenes import bench, plane_depth, seen_from
 
 
@@ -69,3 +75,32 @@ def test_nothing_decoded_gives_nothing():
     nothing = np.full((72, 96), np.nan)
     z = triangulate(bench(), Correspondence(nothing, nothing, np.full((72, 96), Reason.SHADOW, np.uint8)))
     assert np.isnan(z).all()
+
+
+def test_devices_in_one_place_give_no_depth_and_no_warning():
+    calibration = bench()
+    here = replace(calibration.camera, R=np.eye(3), t=np.zeros(3))
+    calibration = replace(calibration, camera=here, projector=here)
+    x, y = np.moveaxis(pixel_grid(calibration.camera.size), -1, 0)
+    seen = Correspondence(x, y, np.zeros(x.shape, np.uint8))
+    assert np.isnan(triangulate(calibration, seen)).all()
+    assert (cull_epipolar(calibration, seen).reason == Reason.EPIPOLAR).all()
+
+
+@pytest.mark.parametrize("reason", [np.uint8(8), np.int8(-1), np.float64(0)])
+def test_reasons_without_a_meaning_are_refused(reason):
+    with pytest.raises(InputError, match=r"`reason` must hold whole numbers in \[0, 7\]"):
+        Correspondence(np.full((2, 3), np.nan), np.full((2, 3), np.nan), np.full((2, 3), reason))
+
+
+def test_a_capture_of_other_devices_is_named_with_both_sizes():
+    calibration = bench()
+    width, height = calibration.camera.size
+    image = np.zeros((height, width), np.uint8)
+    capture = Capture(image, image, (2, 2), PatternKind.GRAY_CODE, [image] * 2, [image] * 2)
+    with pytest.raises(
+        InputError, match=r"`capture.projector_size` must equal calibration.projector.size .*, got \(2, 2"
+    ):
+        pipeline.scan(capture, calibration)
+    with pytest.raises(InputError, match=r"`capture.camera_size` must equal calibration.camera.size"):
+        require_same_devices(replace(calibration, camera=replace(calibration.camera, size=(3, 3))), capture)

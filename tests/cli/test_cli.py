@@ -38,8 +38,9 @@ SIZE = (12, 8)
 CAMERA = Pinhole(
     SIZE, np.array([[10.0, 0, 5.5], [0, 10, 3.5], [0, 0, 1]]), np.zeros(5), np.eye(3), np.array([0, 0, 9.0])
 )
+PROJECTOR = replace(CAMERA, size=(6, 5))
 CALIBRATION = Calibration(
-    CAMERA, CAMERA, {"camera_rms_px": 0.1, "projector_rms_px": 0.2, "stereo_rms_px": 0.3}, {}, 2, "mm"
+    CAMERA, PROJECTOR, {"camera_rms_px": 0.1, "projector_rms_px": 0.2, "stereo_rms_px": 0.3}, {}, 2, "mm"
 )
 
 
@@ -183,6 +184,12 @@ def test_accuracy_measures_the_page_and_not_the_desk(
     assert run("accuracy page -c c.json", capsys)[1].startswith("capture: page\nmean_abs_mm: 0.0")
 
 
+def test_accuracy_refuses_a_capture_of_another_projector(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    io.write_calibration(replace(CALIBRATION, projector=CAMERA), here / "c.json")
+    wanted = "deskew: `capture.projector_size` must equal calibration.projector.size (12, 8), got (6, 5).\n"
+    assert run("accuracy page -c c.json", capsys) == (2, "", wanted)
+
+
 @pytest.mark.parametrize("status", [Status.LOCKED, Status.FOLDED])
 def test_a_page_that_is_not_flat_is_shown_and_said_so(
     here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], status: Status
@@ -235,8 +242,9 @@ WRONG_LINES = {
     "shape of one": ("run page -c c.json -o out/r.png --shape 45", "'--shape' requires 2 arguments"),
     "shape of words": ("run page -c c.json -o out/r.png --shape 45 x", "Invalid value for '--shape'"),
     "shape of fractions": ("run page -c c.json -o out/r.png --shape 4.5 4", "Invalid value for '--shape'"),
-    "shape 1": ("run page -c c.json -o out/r.png --shape 1 45", "`--shape` must be at least 2 vertices down and 2"),
-    "shape negative": ("scan page -c c.json -o out/s.npz --shape -4 -4", "`--shape` must be at least 2"),
+    "shape 1": ("run page -c c.json -o out/r.png --shape 1 45", "`--shape` must be 2 to 1000 vertices down and across"),
+    "shape endless": ("run page -c c.json -o out/r.png --shape 1000000 3", "`--shape` must be 2 to 1000 vertices"),
+    "shape negative": ("scan page -c c.json -o out/s.npz --shape -4 -4", "`--shape` must be 2 to 1000"),
     "no such capture": ("scan gone -c c.json -o out/s.npz", "`gone` must be a folder, got nothing there"),
     "capture a file": ("scan c.json -c c.json -o out/s.npz", "`c.json` must be a folder, got a file"),
     "board for capture": ("scan board -c c.json -o out/s.npz", "`board/capture.toml` must be a file"),
@@ -347,3 +355,29 @@ def test_the_module_ends_with_the_exit_code() -> None:
     done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "deskew: `c.json` must be a file, got nothing there.\n"
+
+
+def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
+    program = (
+        "import sys; from deskew import cli\n"
+        "cli._restore = lambda found, method, output, as_json: (output.touch(), cli._report({}, as_json, output))\n"
+        "sys.exit(cli.main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
+    )
+    with Path("/dev/full").open("w") as full:
+        line = [sys.executable, "-c", program]
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=60)
+    wanted = "deskew: Printing the figures failed: No space left on device; `out/r.png` is written and whole.\n"
+    assert (done.returncode, done.stderr) == (3, wanted)
+
+
+def test_an_interrupt_during_the_imports_is_one_line_and_code_130() -> None:
+    program = (
+        "import sys, runpy\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        if name == 'typer': raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "runpy.run_module('deskew', run_name='__main__')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "deskew: interrupted; nothing was written.\n")

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
+import pickle
+import runpy
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
+from typing import NoReturn
+from unittest import mock
 
 import pytest
 
+from experiments.complaints import refuse_arguments
 from experiments.program import main
 from tests.experiments.conftest import Program
-from tests.experiments.fake_study import ABSENT, ALL_FAIL, NAN, STEP_FAILS, TRIAL_1_FAILS
+from tests.experiments.fake_study import ABSENT, ALL_FAIL, NAN, STEP_FAILS, TRIAL_1_FAILS, FakeStudy
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -47,6 +54,26 @@ ROOT = Path(__file__).resolve().parents[2]
         ("trials", ("`trials`", "KEY=VALUE")),
         ("--nonsense", ("--nonsense", "KEY=VALUE")),
         ("out=/dev/null/x", ("`out`", "/dev/null/x")),
+        (f"out=new/{'y' * 300}", ("`out`", "yyy", "too long")),
+        ("experiment=null", ("`experiment`", "corner_distance, fake", "got null")),
+        ("experiment=1", ("`experiment`", "got 1")),
+        ("experiment=[fake,fake]", ("`experiment`", "got [fake,fake]")),
+        ("engine=null", ("`engine`", "processes, serial", "got null")),
+        ("sheet=[]", ("`sheet`", "mirror", "got []")),
+        ("budget=[smoke,paper]", ("`budget`", "full, paper, smoke", "got [smoke,paper]")),
+        ("hydra=null", ("Hydra", "NoneType")),
+        ("hydra.run.dir=/proc/x", ("`/proc/x`", "path", "No such file")),
+        ("hydra.nope=1", ("`hydra.nope`", "known key, got")),
+        ("--resolve", ("Hydra", "--cfg")),
+        ("--shell-completion", ("Hydra", "install")),
+        ("seed=null", ("`seed`", "[0, 4294967295], got null.")),
+        ("seed=${nope}", ("`seed`", "[0, 4294967295], got ${nope}.")),
+        ("trials=???", ("`trials`", "[1, 100000], got ???.")),
+        ("mesh=5", ("`mesh`", "columns, rows", "got 5.")),
+        ("mesh=null", ("`mesh`", "columns, rows", "got null.")),
+        ("method={a:1}", ("`method`", "list of different names, got {a:1}.")),
+        ("sheet.paths=x.npz", ("`sheet.paths`", "list of NPZ files, one a trial, got x.npz.")),
+        (f"engine.name={'x' * 5000}", ("`engine.name`", "serial, processes", "x ... x")),
     ],
 )
 def test_wrong_input_is_one_line_and_code_2(
@@ -58,7 +85,123 @@ def test_wrong_input_is_one_line_and_code_2(
     assert len(written.err.splitlines()) == 1
     for name in names:
         assert name in written.err
+    assert len(written.err) < 450
+    # Hydra's and OmegaConf's own words are about their insides.
+    assert "full_key" not in written.err
+    assert [path.name for path in out.parent.iterdir()] == ["log"]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "names"),
+    [
+        (["seed=range(0,3,0)"], ("`seed`", "values to sweep over", "range(0,3,0)", "zero")),
+        (["seed=range(3,3)"], ("`seed`", "values to sweep over", "range(3,3)")),
+        (["seed=glob(*)"], ("`seed`", "values to sweep over", "glob(*)")),
+        (["engine=glob(ray*)"], ("`engine`", "match one of processes, serial", "glob(ray*)")),
+        (["out=log", "seed=1,2"], ("`log`", "path", "exists")),
+        (["--run"], ("Only one of --run, --multirun",)),
+    ],
+)
+def test_a_multirun_that_cannot_start_is_one_line_and_code_2(
+    program: Program, out: Path, capsys: pytest.CaptureFixture[str], overrides: list[str], names: tuple[str, ...]
+) -> None:
+    assert program("--multirun", *overrides) == 2
+    written = capsys.readouterr()
+    assert written.out == ""
+    (line,) = written.err.splitlines()
+    assert all(name in line for name in names)
     assert not out.exists()
+
+
+def test_a_long_range_is_not_written_out_to_be_checked() -> None:
+    line = ["experiment=fake", "seed=range(0,1000000000000)"]
+    refuse_arguments(argparse.Namespace(experimental_rerun=None, overrides=line), ROOT / "conf")
+
+
+def test_a_rerun_from_a_pickle_is_refused_unread(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "config.pickle"
+    path.write_bytes(pickle.dumps(Path.touch)[:-1])
+    assert main(["--experimental-rerun", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("`--experimental-rerun` must be left out")
+
+
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [(OSError(28, "No space left on device", "/tmp/x"), "No space left"), (MemoryError(), "not enough memory")],
+)
+def test_what_the_system_refuses_a_job_is_one_line_and_code_3(
+    program: Program,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: Exception,
+    says: str,
+) -> None:
+    monkeypatch.setattr(FakeStudy, "prepare", mock.Mock(side_effect=error))
+    assert program() == 3
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("fake: the system refused: ")
+    assert says in line
+
+
+def test_a_fault_of_the_program_itself_is_not_taken_for_wrong_input(
+    program: Program, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FakeStudy, "prepare", mock.Mock(side_effect=ValueError("a fault")))
+    with pytest.raises(ValueError, match="a fault"):
+        program()
+
+
+def test_ctrl_c_during_the_imports_is_one_line_and_code_130(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupted(ModuleType):
+        def __getattr__(self, name: str) -> NoReturn:
+            raise KeyboardInterrupt
+
+    monkeypatch.setitem(sys.modules, "experiments.program", Interrupted("experiments.program"))
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("experiments", run_name="__main__")
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "Interrupted before anything was done.\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("figures", "file"), ("table.md", "folder"), ("figures/corners.png", "folder")]
+)
+def test_a_report_that_could_not_be_written_is_refused_before_the_trials(
+    program: Program, out: Path, log: Path, capsys: pytest.CaptureFixture[str], name: str, kind: str
+) -> None:
+    (out / name).parent.mkdir(parents=True, exist_ok=True)
+    if kind == "file":
+        (out / name).write_text("notes")
+    else:
+        (out / name).mkdir()
+    assert program() == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"`{out / name}` must be" in line
+    assert f"got a {kind}" in line
+    assert log.read_text() == ""
+    assert not (out / "results.sqlite").exists()
+
+
+def test_a_report_that_breaks_while_it_is_written_leaves_the_old_one(
+    program: Program, out: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert program("trials=1") == 0
+    before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and path.suffix != ".sqlite"}
+    write = Path.write_bytes
+
+    def full(path: Path, data: bytes) -> int:
+        if path.suffix == ".png":
+            raise OSError(28, "No space left on device")
+        return write(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert program("trials=2") == 3
+    assert "No space left on device" in capsys.readouterr().err
+    after = {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and path.suffix != ".sqlite"}
+    assert after == before
 
 
 def test_without_an_experiment_the_program_lists_them(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deskew.errors import InputError
-from experiments.reporting import Column, Layout, Plot
+from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.reporting.export import csv_text
-from experiments.reporting.figures import dot_plot, png_bytes
+from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.statistics import share_interval, summarise
 from experiments.reporting.tables import table
 from experiments.trials import Failure, Outcome, Recorder, Row, TrialKey, unit_of
@@ -106,6 +106,19 @@ def test_interval_covers_the_true_mean_about_as_often_as_it_says() -> None:
 @pytest.mark.parametrize("n", [1, 2])
 def test_two_trials_have_no_interval(n: int) -> None:
     assert summarise([1.0] * n).interval is None
+
+
+def test_a_montage_has_a_column_a_trial_and_bears_missing_pictures() -> None:
+    key = TrialKey("fake")
+    record = Recorder(key)
+    record.picture("page_0_crumpled", np.full((4, 6), 99, np.uint8))
+    record.picture("page_2_restored", np.full((4, 6, 3), 50, np.uint8))
+    wall = Montage("pages", (("crumpled", "page_{trial}_crumpled"), ("restored", "page_{trial}_restored")), "sheet")
+    figure = picture_wall(wall, record.outcome().pictures)
+    assert figure is not None
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["sheet 1", "sheet 3"]
+    assert [len(axes.images) for axes in figure.axes] == [1, 0, 0, 1]
+    assert picture_wall(wall, {}) is None
 
 
 def test_a_failed_trial_counts_against_a_share() -> None:

@@ -8,12 +8,16 @@ import sqlite3
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from experiments.settings import Config
+from experiments.trials import TrialKey
+from experiments.trials.engines import _answer, _Worker
 from tests.experiments.conftest import Program
-from tests.experiments.fake_study import KILLED_ONCE, TRIAL_1_KILLS
+from tests.experiments.fake_study import KILLED_ONCE, TRIAL_1_KILLS, FakeStudy
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -92,6 +96,21 @@ def test_killed_worker_costs_one_trial_which_the_next_run_tries_again(program: P
     log.write_text("")
     assert program(*trouble) == 0
     assert lines_of(log) == ["prepare"]
+
+
+def test_ctrl_c_reaches_no_worker_even_while_it_imports() -> None:
+    config = Config(experiment="fake", trials=1, method="a")
+    worker = _Worker.start(partial(FakeStudy().run, config, 0.25))
+    try:
+        # It takes a second to import: this comes first.
+        os.kill(worker.process.pid or 0, signal.SIGINT)
+        worker.take(TrialKey("fake"))
+        _, outcome = _answer(worker)
+    finally:
+        worker.stop(at_once=False)
+    assert outcome is not None
+    assert worker.process.exitcode == 0
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def test_worker_killed_from_outside_loses_no_row(program: Program, out: Path, log: Path) -> None:

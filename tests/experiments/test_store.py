@@ -76,6 +76,37 @@ def test_a_store_of_another_version_is_refused(tmp_path: Path) -> None:
         Store(tmp_path, "f")
 
 
+@pytest.mark.parametrize("version", [0, 1])
+def test_a_database_of_another_program_is_refused_and_left_as_it_was(tmp_path: Path, version: int) -> None:
+    path = tmp_path / "results.sqlite"
+    connection = sqlite3.connect(path)
+    connection.executescript(f"CREATE TABLE trials (a); PRAGMA user_version = {version};")
+    connection.close()
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="`out` must hold a store of this program or none"):
+        Store(tmp_path, "f")
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("name", ["a\0b", "y" * 300])
+def test_a_folder_that_cannot_be_is_refused_and_leaves_no_parent(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="`out` must be a folder that can be written"):
+        Store(tmp_path / "new" / name, "f")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_a_failed_step_and_keeps_the_trials_before(tmp_path: Path) -> None:
+    other = TrialKey("fake", trial=1, seed=1)
+    with Store(tmp_path, "f") as store:
+        store.record(KEY, outcome(1.0))
+        # What a full disk does, without filling one.
+        store._connection.execute("PRAGMA max_page_count = 1")
+        with pytest.raises(StepError, match="disk is full; finished trials are kept"):
+            store.record(other, Outcome((), pictures={"page": bytes(1 << 20)}))
+    with Store(tmp_path, "f") as store:
+        assert store.finished() == {KEY}
+
+
 def test_an_empty_store_leaves_no_folder_behind(tmp_path: Path) -> None:
     with Store(tmp_path / "a" / "b", "f"):
         assert (tmp_path / "a" / "b").is_dir()

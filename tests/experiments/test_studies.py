@@ -7,11 +7,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from deskew.io import write_arrays
 from deskew.projection import ideal, pixel_grid, project, rays
-from deskew.types import DepthMap, Floats, Pinhole
+from deskew.types import Array, DepthMap, Floats, Pinhole
 from experiments.program import main
 from experiments.studies import STUDIES, find_study
+from experiments.studies.given_sheets import read_sheet
 from experiments.studies.real_boards import _in_world, _onto_bed
 from experiments.studies.scanned import scanned_points
 from experiments.studies.views import restored_corners
@@ -100,6 +104,9 @@ def test_every_study_documents_its_conditions(name: str) -> None:
         (["experiment=corner_distance", "sheet.paths=[a.npz]", "trials=2"], ("`trials`", "at most 1", "got 2")),
         (["experiment=corner_distance", "sheet.paths=[no.npz]", "trials=1"], ("no.npz",)),
         (["experiment=corner_distance", "sheet.slope_p90_deg=50"], ("`sheet.slope_p90_deg`", "[1, 35]", "50")),
+        (["experiment=plane_accuracy", "method=nope"], ("method", "nope")),
+        (["experiment=plane_accuracy", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
+        (["experiment=real_boards", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
         (["experiment=real_boards", "trials=6"], ("`trials`", "at most 5", "got 6")),
         (["experiment=real_boards", "real_boards.path=/no/such"], ("`real_boards.path`", "be a folder", "/no/such")),
     ],
@@ -117,3 +124,57 @@ def test_real_boards_without_data_say_absent(tmp_path: Path, capsys: pytest.Capt
     assert main(["experiment=real_boards", f"out={tmp_path / 'out'}"]) == 0
     assert capsys.readouterr().out.startswith("real_boards: absent: ")
     assert not (tmp_path / "out").exists()
+
+
+def _flat_sheet() -> dict[str, Array]:
+    u, v = np.meshgrid(np.linspace(0.0, 279.0, 8), np.linspace(0.0, 216.0, 6))
+    return {"V": np.stack([u - 139.5, 108.0 - v, 0.0 * u], axis=-1), "F": np.stack([u, v], axis=-1)}
+
+
+def _with(name: str, values: Array) -> dict[str, Array]:
+    return _flat_sheet() | {name: values}
+
+
+FLAT = _flat_sheet()
+
+
+@pytest.mark.parametrize(
+    ("arrays", "names"),
+    [
+        ({"V": FLAT["V"]}, ("hold V (h, w, 3) and F (h, w, 2)", "got V")),
+        (_with("V", np.full((6, 8, 3), np.nan)), (": V`", "finite")),
+        (_with("F", np.full((6, 8, 2), np.inf)), (": F`", "finite")),
+        (_with("V", FLAT["V"][..., :2]), (": V`", "shape (h, w, 3)", "(6, 8, 2)")),
+        (_with("V", FLAT["V"][:1]), (": V`", "h, w >= 2", "(1, 8, 3)")),
+        (_with("F", FLAT["F"][:4]), (": F`", "shape (6, 8, 2)", "(4, 8, 2)")),
+        (_with("V", FLAT["V"] + (0.0, 0.0, 1001.0)), (": V`", "1000 mm of", "got 1001 mm")),
+        (_with("V", np.full((6, 8, 3), 1e300)), (": V`", "1000 mm of", "got 1e+300 mm")),
+        (_with("V", 0.0 * FLAT["V"]), (": V`", "20%", "got 100%")),
+        (_with("V", 1.25 * FLAT["V"]), (": V`", "20%", "got 25%")),
+        (_with("V", 0.75 * FLAT["V"]), (": V`", "20%", "got 25%")),
+        (_with("F", 0.9 * FLAT["F"]), (": F`", "279 x 216 mm", "(251.1, 194.4)")),
+        (_with("F", FLAT["F"] + 50.0), (": F`", "from (0, 0)", "got (50, 50)")),
+    ],
+)
+def test_a_given_sheet_that_is_no_page_is_refused_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arrays: dict[str, Array], names: tuple[str, ...]
+) -> None:
+    path = tmp_path / "sheet.npz"
+    write_arrays(arrays, path)
+    out = tmp_path / "out"
+    assert main(["experiment=corner_distance", f"sheet.paths=[{path}]", "trials=1", f"out={out}"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"`{path}")
+    assert all(name in line for name in names)
+    assert not out.exists()
+
+
+@given(stretch=st.floats(0.81, 1.19), shift=st.floats(-100.0, 100.0))
+def test_a_given_sheet_within_the_bounds_is_read_as_it_is(
+    tmp_path_factory: pytest.TempPathFactory, stretch: float, shift: float
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "within.npz"
+    write_arrays(_with("V", stretch * FLAT["V"] + shift), path)
+    sheet = read_sheet(path, (279.0, 216.0))
+    assert np.array_equal(sheet.vertices, stretch * FLAT["V"] + shift)
+    assert np.array_equal(sheet.flat, FLAT["F"])

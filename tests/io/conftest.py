@@ -59,7 +59,7 @@ def sweep_folder(tmp_path: Path) -> Path:
 def calibration() -> Calibration:
     rotation = np.array([[0.8, 0.6, 0.0], [0.6, -0.8, 0.0], [0.0, 0.0, -1.0]])
     camera = Pinhole(
-        CAMERA, np.array([[900.0, 0.1, 6], [0, 901, 4], [0, 0, 1]]), np.arange(5) / 7, rotation, np.ones(3)
+        CAMERA, np.array([[900.0, 0.0, 6], [0, 901, 4], [0, 0, 1]]), np.arange(5) / 7, rotation, np.ones(3)
     )
     projector = Pinhole(
         PROJECTOR, np.array([[1500.0, 0, 3], [0, 1500, 9], [0, 0, 1]]), np.zeros(5), np.eye(3), np.zeros(3)

@@ -32,7 +32,7 @@ def procam_folder(tmp_path: Path) -> Path:
     return tmp_path / "procam"
 
 
-@pytest.mark.parametrize("square", [25.4, 75, 1 / 3, 1e-9])
+@pytest.mark.parametrize("square", [25.4, 75, 1 / 3, 1e-3])
 def test_a_board_comes_back_as_it_was_written(tmp_path: Path, new_capture: MakeCapture, square: float) -> None:
     captures = [new_capture(PatternKind.LINE_SWEEP), new_capture()]
     write_board(Board((10, 7), square, "units"), captures, tmp_path / "board")
@@ -76,6 +76,8 @@ WRONG_TOML = {
     "corners of three": ("inner_corners = [5, 4, 3]", "inner_corners` must be two integers"),
     "corners too few": ("inner_corners = [5, 2]", r"inner_corners` must be two integers in \[3, 1000\], got \[5, 2\]"),
     "corners absent": ("", "got none named inner_corners"),
+    "square beyond all measure": ("square = 1e300", r"square` must be in \[0.001, 1e\+06\]"),
+    "square of no measure": ("square = 1e-300", r"square` must be in \[0.001, 1e\+06\]"),
     "square zero": ("square = 0", "square` must be a finite number above 0, got 0"),
     "square negative": ("square = -25.4", "square` must be a finite number above 0"),
     "square NaN": ("square = nan", "square` must be a finite number above 0"),

@@ -25,7 +25,7 @@ RESIDUALS = ("camera_rms_px", "projector_rms_px", "stereo_rms_px")
 
 @st.composite
 def pinholes(draw: st.DrawFn) -> Pinhole:
-    K = [[draw(FOCAL), draw(NUMBER), draw(NUMBER)], [0, draw(FOCAL), draw(NUMBER)], [0, 0, 1]]
+    K = [[draw(FOCAL), 0, draw(NUMBER)], [0, draw(FOCAL), draw(NUMBER)], [0, 0, 1]]
     rotation = cv2.Rodrigues(np.array([draw(ANGLE), draw(ANGLE), draw(ANGLE)]))[0]
     size = (draw(st.integers(1, 1 << 16)), draw(st.integers(1, 1 << 16)))
     five, three = ([draw(NUMBER) for _ in range(n)] for n in (5, 3))
@@ -115,6 +115,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "K with true": (put("projector", "K", 0, 0, value=True), "projector: K` must hold 3 x 3 finite numbers"),
     "K of endless size": (put("camera", "K", 0, 0, value=10**400), "camera: K` must hold 3 x 3 finite numbers"),
     "K with zero focal length": (put("camera", "K", 1, 1, value=0), "camera`: `K` must have positive focal lengths"),
+    "K with skew": (put("projector", "K", 0, 1, value=0.1), r"projector: K` must have no skew, got 0\.1"),
     "K with another last row": (put("camera", "K", 2, 2, value=2), "camera: K` must be upper triangular"),
     "distortion of four": (lambda v: v["camera"]["distortion"].pop(), "distortion` must hold 5 finite numbers"),
     "R scaled": (put("camera", "R", 0, 0, value=1.1), "camera`: `R` must be a rotation"),

@@ -139,3 +139,9 @@ def test_hardly_any_page_is_a_failed_step_and_wrong_shapes_are_refused() -> None
         dense_error(restoration(), nothing[1:], PAGE)
     with pytest.raises(InputError, match="`page_size_mm` must be two positive lengths"):
         page_coverage(restoration().backward_map, on_page(page_places()), (0.0, 1.0))
+
+
+@pytest.mark.parametrize("size", [(1e9, 10.0), (10.0, np.inf), (np.nan, 10.0), (-1.0, 10.0), (1e5, 1e5)])
+def test_page_of_no_sound_size_is_refused(size: tuple[float, float]) -> None:
+    with pytest.raises(InputError, match="`page_size_mm` must"):
+        page_coverage(restoration().backward_map, on_page(page_places()), size)

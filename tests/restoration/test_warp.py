@@ -188,3 +188,13 @@ def test_image_of_another_aspect_is_refused() -> None:
 def test_lens_without_distortion_leaves_the_view_alone() -> None:
     image = raw_image()
     np.testing.assert_allclose(undistorted_view(image, replace(CAMERA, distortion=np.zeros(5))), image, atol=1e-3)
+
+
+@pytest.mark.parametrize("lift_mm", [800.0, 900.0, 1e12])
+def test_sheet_behind_the_camera_or_beyond_all_measure_is_refused(lift_mm: float) -> None:
+    sheet = flat_sheet()
+    lifted = Sheet(sheet.vertices + np.array([0.0, 0.0, lift_mm]))
+    with pytest.raises(InputError, match="`sheet` must lie"):
+        texture_quads(raw_image(), CAMERA, lifted, still(sheet))
+    with pytest.raises(InputError, match="`flattened` must lie"):
+        texture_quads(raw_image(), CAMERA, sheet, still(lifted))
