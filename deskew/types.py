@@ -210,6 +210,9 @@ class Calibration:
         Boards used.
     unit : str
         Unit of length of the board's squares; "mm" unless the board states otherwise.
+    camera_psf_px : float or None
+        Standard deviation of a camera pixel's footprint, lens and pixel area together, as the boards' edges show it
+        [px]; None if it is not known.
     """
 
     camera: Pinhole
@@ -218,6 +221,12 @@ class Calibration:
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     n_poses: int = 0
     unit: str = "mm"
+    camera_psf_px: float | None = None
+
+    def __post_init__(self) -> None:
+        psf = self.camera_psf_px
+        good = psf is None or (bool(np.isfinite(psf)) and psf > 0)
+        require(good, "camera_psf_px", "be finite and positive [px], or None", psf)
 
 
 @dataclass(frozen=True, slots=True)
