@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from deskew import acquisition, flattening, restoration
-from deskew.acquisition import DepthSettings, GrayCodeSettings, Outline, SweepSettings
+from deskew.acquisition import DepthSettings, GrayCodeSettings, InkSettings, Outline, SweepSettings
 from deskew.types import (
     Board,
     Calibration,
@@ -67,6 +67,7 @@ def scan(
     mask: npt.NDArray[np.bool_] | None = None,
     sweep: SweepSettings | None = None,
     gray: GrayCodeSettings | None = None,
+    ink: InkSettings | None = None,
     depth: DepthSettings | None = None,
     max_hole_px: float = 12.0,
 ) -> Scan:
@@ -86,10 +87,18 @@ def scan(
         The page in raw pixels, instead of `outline`.
     sweep, gray, depth : settings, optional
         Of the stages.
+    ink : InkSettings, optional
+        Take out what ink does to the decoded coordinates; the paper does not, and by default nor is it done here. A
+        Gray code then keeps the edges of ink, unless `gray` says otherwise.
     max_hole_px : float
         Holes in the depth map up to this distance from measured depth are filled for the mesh.
     """
-    depth_map = acquisition.depth_map(calibration, decode(capture, sweep=sweep, gray=gray), depth)
+    if ink is not None and gray is None:
+        gray = GrayCodeSettings(ink_slope_max=None)
+    correspondence = decode(capture, sweep=sweep, gray=gray)
+    if ink is not None:
+        correspondence = acquisition.correct_ink(calibration, correspondence, capture, ink)
+    depth_map = acquisition.depth_map(calibration, correspondence, depth)
     if outline is None:
         outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask)
     mesh = acquisition.page_mesh(depth_map, outline, shape, max_hole_px=max_hole_px)

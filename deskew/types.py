@@ -181,17 +181,24 @@ class Correspondence:
         Projector coordinates [px], NaN where `reason` is not 0.
     reason : (height, width) uint8 array
         `Reason` of each pixel.
+    stripe_px : (width, height) or None
+        Of a sweep read curve by curve: typical standard deviation of a stripe of the columns across image rows and of
+        one of the rows across image columns [camera px]. None if each pixel was read by itself.
     """
 
     column: Floats
     row: Floats
     reason: npt.NDArray[np.uint8]
+    stripe_px: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         shape = self.column.shape
         require(len(shape) == 2, "column", "be (height, width)", shape)
         require(self.row.shape == shape, "row", f"have column's shape {shape}", self.row.shape)
         require(self.reason.shape == shape, "reason", f"have column's shape {shape}", self.reason.shape)
+        widths = self.stripe_px
+        good = widths is None or (len(widths) == 2 and all(np.isfinite(w) and w >= 0 for w in widths))
+        require(good, "stripe_px", "be two finite widths of at least 0 [camera px], or None", widths)
 
 
 @dataclass(frozen=True, slots=True)

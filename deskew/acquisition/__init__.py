@@ -17,6 +17,7 @@ from deskew.acquisition.corners import (
 )
 from deskew.acquisition.depthmap import DepthSettings, depth_map
 from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
+from deskew.acquisition.ink import InkSettings, correct_ink
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, page_outline, straight_outline
 from deskew.acquisition.stripes import decode_sweep
@@ -26,6 +27,7 @@ __all__ = [
     "BoardView",
     "DepthSettings",
     "GrayCodeSettings",
+    "InkSettings",
     "Outline",
     "PageMesh",
     "PlaneDeviation",
@@ -33,6 +35,7 @@ __all__ = [
     "average_deviation",
     "board_points",
     "calibrate",
+    "correct_ink",
     "decode_gray",
     "decode_sweep",
     "depth_map",

@@ -33,9 +33,10 @@ class GrayCodeSettings:
         the pixel lies on its border. Two make the pixel `WEAK`.
     gap_max_px : int
         Widest stretch of camera pixels between two borders that is interpolated.
-    ink_slope_max : float
+    ink_slope_max : float or None
         Steepest relative change of white minus black [1/px]; where it is steeper, at the edge of ink, a lens of blur
-        sigma bends borders by sigma^2 times it, and the pixel is `EDGE`.
+        sigma bends borders by sigma^2 times it, and the pixel is `EDGE`. None keeps such pixels, for the correction of
+        ink.
     n_dropped_max : int
         Finest bits that may be done without where a projector out of focus washes them out.
     subpixel : bool
@@ -45,7 +46,7 @@ class GrayCodeSettings:
     shadow_snr: float = 4.0
     bit_snr: float = 3.0
     gap_max_px: int = 16
-    ink_slope_max: float = 0.15
+    ink_slope_max: float | None = 0.15
     n_dropped_max: int = 2
     subpixel: bool = True
 
@@ -53,7 +54,8 @@ class GrayCodeSettings:
         require(self.shadow_snr > 0, "shadow_snr", "be positive", self.shadow_snr)
         require(self.bit_snr > 0, "bit_snr", "be positive", self.bit_snr)
         require(self.gap_max_px >= 2, "gap_max_px", "be at least 2", self.gap_max_px)
-        require(self.ink_slope_max > 0, "ink_slope_max", "be positive [1/px]", self.ink_slope_max)
+        slope_max = self.ink_slope_max
+        require(slope_max is None or slope_max > 0, "ink_slope_max", "be positive [1/px] or None", slope_max)
         require(self.n_dropped_max >= 0, "n_dropped_max", "be at least 0", self.n_dropped_max)
 
 
@@ -83,7 +85,8 @@ def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> C
     row = _decode_axis(rows.transpose(0, 2, 1), shadow.T, noise.T, capture.projector_size[1], settings).T
     reason = np.full(shadow.shape, Reason.OK, dtype=np.uint8)
     reason[~np.isfinite(column) | ~np.isfinite(row)] = Reason.WEAK
-    reason[(reason == Reason.OK) & (_ink_slope(white - black, noise) > settings.ink_slope_max)] = Reason.EDGE
+    if settings.ink_slope_max is not None:
+        reason[(reason == Reason.OK) & (_ink_slope(white - black, noise) > settings.ink_slope_max)] = Reason.EDGE
     reason[shadow] = Reason.SHADOW
     missing = reason != Reason.OK
     return Correspondence(np.where(missing, np.nan, column), np.where(missing, np.nan, row), reason)
