@@ -136,10 +136,14 @@ class MeshSettings(Checked):
 
 @dataclass
 class ScanSettings(Checked):
-    """How a line sweep is read (section 2.3): `spatial`, the paper's, per frame; or `temporal`, per pixel."""
+    """How a line sweep is read (section 2.3): `spatial`, the paper's, per frame; or `temporal`, per pixel.
+
+    `ink` takes out what ink does to the decoded coordinates; the paper does not.
+    """
 
     group: ClassVar[str] = "scan."
     mode: str = choice("spatial", "spatial", "temporal")
+    ink: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
 
 
 @dataclass

@@ -10,7 +10,7 @@ import numpy as np
 import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import metrics, pipeline, restoration
-from deskew.acquisition import SweepSettings
+from deskew.acquisition import InkSettings, SweepSettings
 from deskew.errors import InputError, require
 from deskew.types import Array, Capture, Floats, Pinhole, Scan, Status
 from experiments.reporting import Column, Layout, Montage, Plot
@@ -110,7 +110,8 @@ class CornerDistance(Study):
         # The sweeps are rendered while they are decoded: this stage holds both.
         with record.stage("scan"):
             shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
-            scan = pipeline.scan(capture, bench.calibration, shape=shape, sweep=sweep)
+            ink = InkSettings() if config.scan.ink else None
+            scan = pipeline.scan(capture, bench.calibration, shape=shape, sweep=sweep, ink=ink)
         trial = _Trial(record, bench, page, truth, scan, config.methods[0])
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)
