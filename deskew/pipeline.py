@@ -8,7 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from deskew import acquisition, flattening, restoration
-from deskew.acquisition import DenoiseSettings, DepthSettings, GrayCodeSettings, Outline, SweepSettings
+from deskew.acquisition import (
+    DenoiseSettings,
+    DepthSettings,
+    GrayCodeSettings,
+    InkSettings,
+    Outline,
+    SweepSettings,
+)
 from deskew.errors import StepError, require
 from deskew.types import (
     WHITE,
@@ -78,6 +85,7 @@ def scan(
     mask: npt.NDArray[np.bool_] | None = None,
     sweep: SweepSettings | None = None,
     gray: GrayCodeSettings | None = None,
+    ink: InkSettings | None = None,
     depth: DepthSettings | None = None,
     denoise: DenoiseSettings | None = None,
     max_hole_px: float = 12.0,
@@ -100,6 +108,9 @@ def scan(
         The page in raw pixels, instead of `outline`.
     sweep, gray, depth : settings, optional
         Of the stages.
+    ink : InkSettings, optional
+        Take out what ink does to the decoded coordinates; the paper does not, and by default nor is it done here. A
+        Gray code then keeps the edges of ink, unless `gray` says otherwise.
     denoise : DenoiseSettings, optional
         Of the filter that the depth map passes; none if not given, as in the paper.
     max_hole_px : float
@@ -111,7 +122,11 @@ def scan(
         If the capture and the calibration are not of devices of the same sizes.
     """
     acquisition.require_same_devices(calibration, capture)
+    if ink is not None and gray is None:
+        gray = GrayCodeSettings(ink_slope_max=None)
     decoded = decoded or decode(capture, sweep=sweep, gray=gray)
+    if ink is not None:
+        decoded = acquisition.correct_ink(calibration, decoded, capture, ink)
     depth_map = acquisition.depth_map(calibration, decoded, depth)
     if denoise is not None:
         depth_map = acquisition.denoise_depth(depth_map, denoise)

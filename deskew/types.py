@@ -195,11 +195,15 @@ class Correspondence:
         Projector coordinates [px], NaN where `reason` is not 0.
     reason : (height, width) uint8 array
         `Reason` of each pixel.
+    stripe_px : (width, height) or None
+        Of a sweep read curve by curve: typical standard deviation of a stripe of the columns across image rows and of
+        one of the rows across image columns [camera px]. None if each pixel was read by itself.
     """
 
     column: Floats
     row: Floats
     reason: npt.NDArray[np.uint8]
+    stripe_px: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         shape = self.column.shape
@@ -207,6 +211,9 @@ class Correspondence:
         require(self.row.shape == shape, "row", f"have column's shape {shape}", self.row.shape)
         require(self.reason.shape == shape, "reason", f"have column's shape {shape}", self.reason.shape)
         _require_reasons(self.reason)
+        widths = self.stripe_px
+        good = widths is None or (len(widths) == 2 and all(np.isfinite(w) and w >= 0 for w in widths))
+        require(good, "stripe_px", "be two finite widths of at least 0 [camera px], or None", widths)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,6 +232,9 @@ class Calibration:
         Boards used.
     unit : str
         Unit of length of the board's squares; "mm" unless the board states otherwise.
+    camera_psf_px : float or None
+        Standard deviation of a camera pixel's footprint, lens and pixel area together, as the boards' edges show it
+        [px]; None if it is not known.
     """
 
     camera: Pinhole
@@ -233,6 +243,12 @@ class Calibration:
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     n_poses: int = 0
     unit: str = "mm"
+    camera_psf_px: float | None = None
+
+    def __post_init__(self) -> None:
+        psf = self.camera_psf_px
+        good = psf is None or (bool(np.isfinite(psf)) and psf > 0)
+        require(good, "camera_psf_px", "be finite and positive [px], or None", psf)
 
 
 @dataclass(frozen=True, slots=True)

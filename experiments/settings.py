@@ -139,12 +139,14 @@ class ScanSettings(Checked):
     """How a page is scanned.
 
     `mode`: how a line sweep is read (section 2.3), `spatial`, the paper's, per frame; or `temporal`, per pixel.
+    `ink`: whether what ink does to the decoded coordinates is taken out; the paper does not.
     `denoise`: whether the depth map is filtered before it is meshed; the paper's is not.
     """
 
     group: ClassVar[str] = "scan."
     mode: str = choice("spatial", "spatial", "temporal")
-    denoise: bool = False
+    ink: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
+    denoise: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
 
 
 @dataclass

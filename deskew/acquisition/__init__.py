@@ -18,6 +18,7 @@ from deskew.acquisition.corners import (
 from deskew.acquisition.denoise import DenoiseSettings, denoise_depth, depth_noise
 from deskew.acquisition.depthmap import DepthSettings, depth_map
 from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
+from deskew.acquisition.ink import InkSettings, correct_ink
 from deskew.acquisition.matches import require_same_devices
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, page_outline, straight_outline
@@ -29,6 +30,7 @@ __all__ = [
     "DenoiseSettings",
     "DepthSettings",
     "GrayCodeSettings",
+    "InkSettings",
     "Outline",
     "PageMesh",
     "PlaneDeviation",
@@ -36,6 +38,7 @@ __all__ = [
     "average_deviation",
     "board_points",
     "calibrate",
+    "correct_ink",
     "decode_gray",
     "decode_sweep",
     "denoise_depth",

@@ -8,7 +8,7 @@ adjustment over all boards fits both devices, their relation and the poses, unti
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from deskew.acquisition.bundle import INTRINSICS, Bundle, Observations, Refined, on_board, refine
 from deskew.acquisition.corners import find_board
 from deskew.acquisition.grey import grey_levels
+from deskew.acquisition.psf import camera_psf, edge_blurs
 from deskew.errors import StepError, require, require_whole
 from deskew.types import Board, Calibration, Capture, Correspondence, Floats, Pinhole, Size
 
@@ -43,6 +44,8 @@ class BoardView:
         Their projector coordinates [px].
     camera_size, projector_size : (width, height)
         Of the devices [px].
+    edge_blurs : (E,) array
+        Blur of the board's edges in the camera [px]; empty if none could be measured.
     """
 
     corners: Floats
@@ -50,6 +53,7 @@ class BoardView:
     projected: Floats
     camera_size: Size
     projector_size: Size
+    edge_blurs: Floats = field(default_factory=lambda: np.empty(0))
 
 
 def board_points(board: Board) -> Floats:
@@ -81,7 +85,8 @@ def view_board(board: Board, capture: Capture, correspondence: Correspondence, n
         If the board is not found or hardly any pixel inside it is decoded.
     """
     require_whole("n_pixels_max", n_pixels_max, _FEWEST_PIXELS, 1_000_000_000)
-    lit = grey_levels(capture.white, "white").astype(np.float64) - grey_levels(capture.black, "black")
+    white = grey_levels(capture.white, "white")
+    lit = white.astype(np.float64) - grey_levels(capture.black, "black")
     got = correspondence.column.shape
     require(got == lit.shape, "correspondence", f"have the capture's shape {lit.shape}", got)
     corners = find_board(lit, board.shape)
@@ -96,7 +101,9 @@ def view_board(board: Board, capture: Capture, correspondence: Correspondence, n
     x, y = x[kept], y[kept]
     projected = np.stack([correspondence.column[y, x], correspondence.row[y, x]], axis=-1).astype(np.float64)
     pixels = np.stack([x, y], axis=-1).astype(np.float64)
-    return BoardView(corners.reshape(-1, 2), pixels, projected, capture.camera_size, capture.projector_size)
+    clipped = white >= np.iinfo(white.dtype).max if white.dtype.kind == "u" else np.zeros(white.shape, dtype=bool)
+    blurs = edge_blurs(lit, corners, ~clipped)
+    return BoardView(corners.reshape(-1, 2), pixels, projected, capture.camera_size, capture.projector_size, blurs)
 
 
 def _inside_white(board: Board, corners: Floats, lit: Floats) -> np.ndarray:
@@ -166,7 +173,8 @@ def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
     projector_rms, projector = _projector_alone(seen, camera, poses, projector_size)
     solved = refine(Bundle(camera, projector, poses), seen)
     alone = {"camera_rms_px": camera_rms, "projector_rms_px": projector_rms}
-    return _calibration(solved, board, alone)
+    psf = camera_psf(np.concatenate([view.edge_blurs for view in views]))
+    return replace(_calibration(solved, board, alone), camera_psf_px=psf)
 
 
 def _camera_alone(seen: Observations, size: Size) -> tuple[float, Pinhole, Floats]:

@@ -6,6 +6,8 @@ gates of the depth map are for those.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from deskew.acquisition.matches import Matches, match
@@ -70,8 +72,9 @@ def cull_epipolar(
     off = (correspondence.reason == Reason.OK) & ~(
         np.abs(epipolar_distance(calibration, correspondence)) <= tolerance_px
     )
-    return Correspondence(
-        np.where(off, np.nan, correspondence.column),
-        np.where(off, np.nan, correspondence.row),
-        np.where(off, np.uint8(Reason.EPIPOLAR), correspondence.reason),
+    return replace(
+        correspondence,
+        column=np.where(off, np.nan, correspondence.column),
+        row=np.where(off, np.nan, correspondence.row),
+        reason=np.where(off, np.uint8(Reason.EPIPOLAR), correspondence.reason),
     )

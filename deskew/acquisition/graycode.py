@@ -35,9 +35,10 @@ class GrayCodeSettings:
         the pixel lies on its border. Two make the pixel `WEAK`.
     gap_max_px : int
         Widest stretch of camera pixels between two borders that is interpolated.
-    ink_slope_max : float
+    ink_slope_max : float or None
         Steepest relative change of white minus black [1/px]; where it is steeper, at the edge of ink, a lens of blur
-        sigma bends borders by sigma^2 times it, and the pixel is `EDGE`.
+        sigma bends borders by sigma^2 times it, and the pixel is `EDGE`. None keeps such pixels, for the correction of
+        ink.
     n_dropped_max : int
         Finest bits that may be done without where a projector out of focus washes them out.
     subpixel : bool
@@ -47,7 +48,7 @@ class GrayCodeSettings:
     shadow_snr: float = 4.0
     bit_snr: float = 3.0
     gap_max_px: int = 16
-    ink_slope_max: float = 0.15
+    ink_slope_max: float | None = 0.15
     n_dropped_max: int = 2
     subpixel: bool = True
 
@@ -55,7 +56,8 @@ class GrayCodeSettings:
         require_positive("shadow_snr", self.shadow_snr, 1e6)
         require_positive("bit_snr", self.bit_snr, 1e6)
         require_whole("gap_max_px", self.gap_max_px, 2, 100_000)
-        require_positive("ink_slope_max", self.ink_slope_max, 1e6, "1/px")
+        if self.ink_slope_max is not None:
+            require_positive("ink_slope_max", self.ink_slope_max, 1e6, "1/px")
         require_whole("n_dropped_max", self.n_dropped_max, 0, 16)
         require(isinstance(self.subpixel, bool), "subpixel", "be true or false", repr(self.subpixel))
 
@@ -94,7 +96,8 @@ def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> C
     row = _decode_axis(rows.transpose(0, 2, 1), shadow.T, noise.T, capture.projector_size[1], settings).T
     reason = np.full(shadow.shape, Reason.OK, dtype=np.uint8)
     reason[~np.isfinite(column) | ~np.isfinite(row)] = Reason.WEAK
-    reason[(reason == Reason.OK) & (_ink_slope(white - black, noise) > settings.ink_slope_max)] = Reason.EDGE
+    if settings.ink_slope_max is not None:
+        reason[(reason == Reason.OK) & (_ink_slope(white - black, noise) > settings.ink_slope_max)] = Reason.EDGE
     reason[shadow] = Reason.SHADOW
     missing = reason != Reason.OK
     return Correspondence(np.where(missing, np.nan, column), np.where(missing, np.nan, row), reason)

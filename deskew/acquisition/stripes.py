@@ -66,4 +66,9 @@ def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Cor
             "same still scene, and that frame i lights projector line i."
         )
     missing = np.float32(np.nan)
-    return Correspondence(np.where(ok, columns.position, missing), np.where(ok, rows.position, missing), reason)
+    return Correspondence(
+        np.where(ok, columns.position, missing),
+        np.where(ok, rows.position, missing),
+        reason,
+        (columns.width, rows.width) if settings.mode == "spatial" else None,
+    )

@@ -107,10 +107,13 @@ class Sweep:
         Projector coordinate [px]; meaningless where `reason` is not 0.
     reason : (height, width) uint8 array
         `Reason` of each pixel.
+    width : float
+        Typical standard deviation of a stripe [frames, or camera px read curve by curve]; 0 if there is none.
     """
 
     position: Floats
     reason: npt.NDArray[np.uint8]
+    width: float
 
 
 def still_scene(capture: Capture, settings: SweepSettings) -> Scene:
@@ -166,12 +169,15 @@ class Peaks:
         [samples], [grey levels] and [samples].
     reason : (n,) uint8 array
         WEAK when lost in noise or narrower than a stripe, TWO_PEAKS when too wide for one; else OK.
+    typical_width : float
+        Median width of the higher peaks [samples]; 0 if there is none.
     """
 
     position: Floats
     amplitude: Floats
     width: Floats
     reason: npt.NDArray[np.uint8]
+    typical_width: float
 
 
 def measure(
@@ -195,6 +201,7 @@ def measure(
     reason = np.full(len(index), Reason.WEAK, np.uint8)
     # A high sample whose fit failed is no weak peak but no peak at all.
     high_sample = profiles[:, settings.half_width] - level >= _MEASURES_WIDTH * noise
+    typical = 0.0
     strong = high_sample | (matched_snr(amplitude, width, noise) >= _MEASURES_WIDTH)
     if (strong & (amplitude > 0)).any():
         # Of the higher peaks only: the lower ones' widths are noise.
@@ -209,7 +216,7 @@ def measure(
     reason[index < 0] = Reason.WEAK
     if settings.peak == "integer":
         position = index.astype(np.float32)
-    return Peaks(position, amplitude, width, reason)
+    return Peaks(position, amplitude, width, reason, typical)
 
 
 def matched_snr(amplitude: Floats, width: Floats, noise: float) -> Floats:

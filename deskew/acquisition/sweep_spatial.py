@@ -113,8 +113,8 @@ def _fill(
 
 def _observe(
     frames: Iterator[Array], n_frames: int, scene: Scene, settings: SweepSettings, along_rows: bool
-) -> tuple[Floats, Array, float]:
-    """Find every curve; return positions and states, (frames, lines), and the dark noise."""
+) -> tuple[Floats, Array, float, float]:
+    """Find every curve; return positions and states, (frames, lines), the dark noise and a stripe's typical width."""
     first = np.stack([next(frames) for _ in range(settings.window)])
     noise = dark_noise(first, scene)
     level = dark_level(first, scene, noise)
@@ -138,7 +138,7 @@ def _observe(
     state[(state == Reason.OK) & (second > rival)] = Reason.TWO_PEAKS
     state[clipped & (index >= 0)] = Reason.SATURATED
     position = peaks.position.reshape(index.shape)
-    return np.where(clipped, index, position).astype(np.float32), state, noise
+    return np.where(clipped, index, position).astype(np.float32), state, noise, peaks.typical_width
 
 
 def decode_spatial(
@@ -164,7 +164,7 @@ def decode_spatial(
     Sweep
         Projector coordinate at each pixel's centre.
     """
-    position, state, noise = _observe(frames, n_frames, scene, settings, along_rows)
+    position, state, noise, width = _observe(frames, n_frames, scene, settings, along_rows)
     shape = scene.black.shape
     turned = shape if along_rows else shape[::-1]
     out = np.full(turned, np.nan, np.float32)
@@ -173,4 +173,4 @@ def decode_spatial(
     if not along_rows:
         out, reason = np.ascontiguousarray(out.T), np.ascontiguousarray(reason.T)
     reason[shadowed(scene, noise, settings)] = Reason.SHADOW
-    return Sweep(out, reason)
+    return Sweep(out, reason, width)

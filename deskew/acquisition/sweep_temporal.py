@@ -153,4 +153,5 @@ def decode_temporal(frames: Iterator[Array], n_frames: int, scene: Scene, settin
     reason[(reason == Reason.OK) & (second > rival)] = Reason.TWO_PEAKS
     reason[tracks.profiles.max(axis=1) >= scene.saturated_level] = Reason.SATURATED
     reason[dark] = Reason.SHADOW
-    return Sweep(peaks.position.reshape(scene.black.shape), reason.reshape(scene.black.shape))
+    shape = scene.black.shape
+    return Sweep(peaks.position.reshape(shape), reason.reshape(shape), peaks.typical_width)

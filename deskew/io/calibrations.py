@@ -76,6 +76,8 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         "residuals": residuals,
         "uncertainty": uncertainty,
     }
+    if calibration.camera_psf_px is not None:
+        values["camera_psf_px"] = float(calibration.camera_psf_px)
     write_bytes((json.dumps(values, indent=1, allow_nan=False) + "\n").encode(), path)
 
 
@@ -85,7 +87,7 @@ def read_calibration(path: Path) -> Calibration:
     Parameters
     ----------
     path : Path
-        As :func:`write_calibration` left it; `uncertainty` may be absent.
+        As :func:`write_calibration` left it; `uncertainty` and `camera_psf_px` may be absent.
 
     Returns
     -------
@@ -99,7 +101,7 @@ def read_calibration(path: Path) -> Calibration:
     """
     path = Path(path)
     fields = Fields(read_json(path), str(path))
-    fields.only(("version", "unit", "n_poses", "camera", "projector", "residuals"), ("uncertainty",))
+    fields.only(("version", "unit", "n_poses", "camera", "projector", "residuals"), ("uncertainty", "camera_psf_px"))
     fields.version("version", CALIBRATION_VERSION)
     residuals = fields.table("residuals")
     residuals.only(_RESIDUALS)
@@ -110,4 +112,5 @@ def read_calibration(path: Path) -> Calibration:
         uncertainty=fields.table("uncertainty").deviations() if "uncertainty" in fields.values else {},
         n_poses=fields.integer("n_poses", 0, 1 << 20),
         unit=fields.word("unit"),
+        camera_psf_px=fields.positive("camera_psf_px") if "camera_psf_px" in fields.values else None,
     )

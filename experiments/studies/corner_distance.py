@@ -10,7 +10,7 @@ import numpy as np
 import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import acquisition, metrics, pipeline, restoration
-from deskew.acquisition import SweepSettings
+from deskew.acquisition import InkSettings, SweepSettings
 from deskew.errors import require
 from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan
 from experiments.reporting import Column, Layout, Montage, Plot
@@ -160,11 +160,11 @@ class _Trial:
     def scanned(self, config: Config, capture: Capture) -> Scan | None:
         """Scan the page and measure the depth map; None if that failed, which fails every method."""
         shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
-        calibration = self.bench.calibration
+        calibration, ink = self.bench.calibration, InkSettings() if config.scan.ink else None
         try:
             # The sweeps are rendered while they are decoded: this stage holds both.
             with self.record.stage("scan"):
-                scan = pipeline.scan(capture, calibration, shape=shape, sweep=sweep)
+                scan = pipeline.scan(capture, calibration, shape=shape, sweep=sweep, ink=ink)
             raw = scan.depth
             if config.scan.denoise:
                 with self.record.stage("denoise"):

@@ -12,7 +12,7 @@ from deskew import acquisition, metrics, pipeline, restoration
 from deskew.acquisition import SweepSettings
 from deskew.errors import require
 from experiments.reporting import Column, Layout, Plot
-from experiments.settings import Config
+from experiments.settings import Config, ScanSettings
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.methods import require_methods
 from experiments.studies.scanned import scanned_points
@@ -75,10 +75,9 @@ class PlaneAccuracy(Study):
         # The first lies flat; the others lean to all sides.
         tilt = 0.0 if key.trial == 0 else float(rng.uniform(2.0, 15.0))
         azimuth = float(rng.uniform(0.0, 360.0))
-        sweep = SweepSettings(mode=config.scan.mode)
         for condition, page in (("white", Blank()), ("checkered", Checkerboard())):
             with record.attempt(condition):
-                _measure(record, condition, bench, page, (tilt, azimuth), rng, sweep)
+                _measure(record, condition, bench, page, (tilt, azimuth), rng, config.scan)
         return record.outcome()
 
 
@@ -89,13 +88,15 @@ def _measure(
     page: Page,
     lean_deg: tuple[float, float],
     rng: np.random.Generator,
-    sweep: SweepSettings,
+    settings: ScanSettings,
 ) -> None:
     camera = bench.calibration.camera
     sheet = data_synth.plane(page.page_size_mm, tilt_deg=lean_deg[0], azimuth_deg=lean_deg[1])
     with record.stage("scan", condition):
         capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-        correspondence = pipeline.decode(capture, sweep=sweep)
+        correspondence = pipeline.decode(capture, sweep=SweepSettings(mode=settings.mode))
+        if settings.ink:
+            correspondence = acquisition.correct_ink(bench.calibration, correspondence, capture)
     with record.stage("depth", condition):
         depth = acquisition.depth_map(bench.calibration, correspondence)
     # Only the plane itself is fitted: desk beside it is none of it.

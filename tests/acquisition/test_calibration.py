@@ -94,6 +94,12 @@ def test_residuals_state_the_noise():
     assert calibration.residuals["stereo_rms_px"] == pytest.approx(np.sqrt(0.03**2 + 0.05**2), rel=0.1)
 
 
+@pytest.mark.parametrize(("edges", "expected"), [(0, None), (1, None), (40, 0.8)])
+def test_the_camera_s_spread_is_the_median_over_all_boards_edges(edges, expected):
+    views = [replace(view, edge_blurs=np.full(edges, 0.6 + 0.05 * i)) for i, view in enumerate(_views())]
+    assert calibrate(BOARD, views).camera_psf_px == (expected and pytest.approx(expected))
+
+
 def test_wild_pixels_are_rejected():
     views = _views(0.03, 0.05)
     wild = views[2].projected.copy()

@@ -53,7 +53,9 @@ def test_fewer_trials_report_only_those_planned(program: Program, out: Path, log
     assert {line.split(",")[3] for line in (out / "results.csv").read_text().splitlines()[1:]} == {"0", "1"}
 
 
-@pytest.mark.parametrize("change", ["sheet.slope_p90_deg=21", "method=[a]", "rig.noise_scale=2", "mesh.rows=30"])
+@pytest.mark.parametrize(
+    "change", ["sheet.slope_p90_deg=21", "method=[a]", "rig.noise_scale=2", "mesh.rows=30", "scan.ink=true"]
+)
 def test_changed_settings_never_mix_with_old_rows(program: Program, out: Path, log: Path, change: str) -> None:
     assert program("trials=2") == 0
     before = (out / "results.csv").read_bytes()

@@ -40,6 +40,7 @@ def same(a: Calibration, b: Calibration) -> bool:
         all(getattr(x, n).tobytes() == getattr(y, n).tobytes() for x, y in devices for n in arrays)
         and all(x.size == y.size for x, y in devices)
         and (a.residuals, a.uncertainty, a.n_poses, a.unit) == (b.residuals, b.uncertainty, b.n_poses, b.unit)
+        and a.camera_psf_px == b.camera_psf_px
     )
 
 
@@ -51,6 +52,7 @@ def same(a: Calibration, b: Calibration) -> bool:
     uncertainty=st.dictionaries(st.text(min_size=1, max_size=20), DEVIATION, max_size=5),
     n_poses=st.integers(0, 1000),
     unit=st.sampled_from(["mm", "units", "µm"]),
+    psf=st.none() | st.floats(min_value=0, exclude_min=True, allow_infinity=False),
 )
 def test_every_number_survives_exactly(
     tmp_path_factory: pytest.TempPathFactory,
@@ -60,9 +62,11 @@ def test_every_number_survives_exactly(
     uncertainty: dict[str, float],
     n_poses: int,
     unit: str,
+    psf: float | None,
 ) -> None:
     path = tmp_path_factory.mktemp("calibration") / "c.json"
-    written = Calibration(camera, projector, dict(zip(RESIDUALS, residuals, strict=True)), uncertainty, n_poses, unit)
+    stated = dict(zip(RESIDUALS, residuals, strict=True))
+    written = Calibration(camera, projector, stated, uncertainty, n_poses, unit, psf)
     write_calibration(written, path)
     assert same(read_calibration(path), written)
 
@@ -81,6 +85,21 @@ def test_uncertainty_may_be_left_out(tmp_path: Path, calibration: Calibration) -
     del values["uncertainty"]
     (tmp_path / "c.json").write_text(json.dumps(values))
     assert same(read_calibration(tmp_path / "c.json"), replace(calibration, uncertainty={}))
+
+
+def test_a_spread_that_is_not_known_is_left_out(tmp_path: Path, calibration: Calibration) -> None:
+    write_calibration(replace(calibration, camera_psf_px=0.8), tmp_path / "c.json")
+    values = json.loads((tmp_path / "c.json").read_text())
+    assert values.pop("camera_psf_px") == 0.8
+    (tmp_path / "c.json").write_text(json.dumps(values))
+    assert same(read_calibration(tmp_path / "c.json"), calibration)
+    assert calibration.camera_psf_px is None
+
+
+@pytest.mark.parametrize("psf", [0.0, -0.8, np.nan, np.inf])
+def test_a_spread_is_positive(calibration: Calibration, psf: float) -> None:
+    with pytest.raises(InputError, match=r"`camera_psf_px` must be finite and positive \[px\], or None"):
+        replace(calibration, camera_psf_px=psf)
 
 
 def put(*keys: str | int, value: Any) -> Callable[[dict[str, Any]], object]:
@@ -128,6 +147,8 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
         "camera_rms_px.*must be a finite number of at",
     ),
     "uncertainty negative": (put("uncertainty", "camera_fx_px", value=-1), "camera_fx_px.*must be a finite number"),
+    "spread of zero": (put("camera_psf_px", value=0), "camera_psf_px` must be a finite number above 0, got 0"),
+    "spread null": (put("camera_psf_px", value=None), "camera_psf_px` must be a finite number above 0"),
     "uncertainty a list": (put("uncertainty", value=[1]), "uncertainty` must be a table"),
 }
 
