@@ -77,9 +77,10 @@ def test_a_gray_code_keeps_the_edges_of_ink_when_they_are_corrected(monkeypatch,
         raise Decoded(settings or GrayCodeSettings())
 
     monkeypatch.setattr(acquisition, "decode_gray", record)
-    picture = np.zeros((8, 8), np.uint8)
-    capture = Capture(picture, picture, (4, 4), PatternKind.GRAY_CODE, [picture] * 4, [picture] * 4)
     known = calibration(data_synth.default_rig())
+    picture = np.zeros(known.camera.size[::-1], np.uint8)
+    frames = [picture] * 20  # 10 bits and their inverses
+    capture = Capture(picture, picture, known.projector.size, PatternKind.GRAY_CODE, frames, frames)
     with pytest.raises(Decoded) as asked:
         pipeline.scan(capture, known, ink=ink, gray=given)
     assert asked.value.args[0].ink_slope_max == limit

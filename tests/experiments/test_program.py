@@ -37,7 +37,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("sheet.paths=[a.png]", ("`sheet.paths`", "NPZ", "a.png")),
         ("rig.noise_scale=-0.5", ("`rig.noise_scale`", "[0, 10]", "-0.5")),
         ("rig.colour=red", ("`rig.colour`", "noise_scale")),
-        ("scan.ink=some", ("`scan.ink`", "true or false", "'some'")),
+        ("scan.ink=some", ("`scan.ink`", "true or false", "got some")),
         ("mesh.rows=1", ("`mesh.rows`", "[2, 1000]", "1")),
         ("colour=red", ("`colour`", "one of budget, engine, experiment")),
         ("+x=1", ("`x`", "existing key", "+x=1")),
