@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from deskew.errors import StepError
@@ -26,6 +25,9 @@ _POSE = 6
 _CAMERA, _PROJECTOR, _STEREO = slice(0, 8), slice(8, 16), slice(16, 22)
 _SHARED = 22  # parameters before the poses
 _REJECT_SIGMAS = 4.0
+_ROUNDS = 4  # the weights settle within them
+_ITERATIONS = 100
+_RESTS = 1e-6  # gain of a step, in noise variances: no parameter then moves by a 1000th of its deviation
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +44,9 @@ class Observations:
         Camera pixels on the board and their projector coordinates [px], all poses together.
     pose : (S,) int array
         The pose that each belongs to.
-    n_independent : float
-        How many of the S pixels count as independent observations: the pixels of one square share the board's
-        unevenness there and the decoder's systematic error, so that they count as one together.
+    square : (S,) int array
+        The board's square that each lies in, numbered over all poses: pixels of one square share the board's
+        unevenness there and the decoder's systematic error.
     """
 
     points: Floats
@@ -52,7 +54,7 @@ class Observations:
     pixels: Floats
     projected: Floats
     pose: Ints
-    n_independent: float
+    square: Ints
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +146,7 @@ def pixel_residuals(bundle: Bundle, seen: Observations) -> Floats:
 
 
 def refine(start: Bundle, seen: Observations) -> Refined:
-    """Refine to convergence: once with equal weights, then with each kind's own noise level and without outliers.
+    """Refine to convergence: first on the corners above all, then with each kind's own noise level, without outliers.
 
     Raises
     ------
@@ -152,19 +154,43 @@ def refine(start: Bundle, seen: Observations) -> Refined:
         If the bundle does not converge, or the poses leave a parameter undetermined.
     """
     kept = np.ones(len(seen.pixels), dtype=bool)
-    shared = float(np.sqrt(len(seen.pixels) / seen.n_independent))
-    sigmas = (1.0, shared)
+    # Until the residuals say how far they agree, the pixels of a square count as one.
+    sigmas = (1.0, float(np.sqrt(len(seen.pixels) / len(np.unique(seen.square)))))
     bundle = start
-    for _ in range(3):
+    for _ in range(_ROUNDS):
         bundle, jacobian = _solve(bundle, _subset(seen, kept), sigmas)
         corner, pixel = corner_residuals(bundle, seen), pixel_residuals(bundle, seen)
         sigma_pixel = 1.4826 * float(np.median(np.abs(pixel)))
         kept = np.abs(pixel).max(axis=-1) < _REJECT_SIGMAS * _floor(sigma_pixel)
-        sigmas = (
-            _floor(float(np.sqrt(np.mean(corner**2)))),
-            shared * _floor(float(np.sqrt(np.mean(pixel[kept] ** 2)))),
-        )
+        sigmas = (_floor(float(np.sqrt(np.mean(corner**2)))), _floor(shared_noise(pixel[kept], seen.square[kept])))
     return Refined(bundle, corner, pixel, kept, _deviations(jacobian))
+
+
+def shared_noise(residuals: Floats, square: Ints) -> float:
+    """Noise level that makes pixels count for what they know together, from a one-way analysis of variance.
+
+    The mean of m pixels of a square has the variance ``between + within / m``: weighting each pixel by the mean square
+    BETWEEN squares, ``m between + within``, gives the mean just that. Where a square's pixels err independently
+    (`between` is 0) this is the plain noise, and where they all err alike they count as one.
+
+    Parameters
+    ----------
+    residuals : (S, 2) array
+        Of the pixels [px].
+    square : (S,) int array
+        The square of each.
+
+    Returns
+    -------
+    float
+        One standard deviation [px].
+    """
+    _, member, counts = np.unique(square, return_inverse=True, return_counts=True)
+    sums = np.stack([np.bincount(member, residuals[:, axis]) for axis in (0, 1)], axis=-1)
+    explained = float((sums**2 / counts[:, None]).sum())
+    total = float((residuals**2).sum())
+    within = (total - explained) / max(2 * (len(residuals) - len(counts)), 1)
+    return float(np.sqrt(max(explained / (2 * len(counts)), within)))
 
 
 def _deviations(jacobian: Floats) -> Floats:
@@ -184,7 +210,13 @@ def _floor(sigma_px: float) -> float:
 
 
 def _subset(seen: Observations, kept: npt.NDArray[np.bool_]) -> Observations:
-    return replace(seen, pixels=seen.pixels[kept], projected=seen.projected[kept], pose=seen.pose[kept])
+    return replace(
+        seen,
+        pixels=seen.pixels[kept],
+        projected=seen.projected[kept],
+        pose=seen.pose[kept],
+        square=seen.square[kept],
+    )
 
 
 def _solve(start: Bundle, seen: Observations, sigmas: tuple[float, float]) -> tuple[Bundle, Floats]:
@@ -201,16 +233,55 @@ def _solve(start: Bundle, seen: Observations, sigmas: tuple[float, float]) -> tu
     def jacobian(parameters: Floats) -> Floats:
         return _grouped_jacobian(residuals, parameters, rows, n_poses)
 
-    first = start.packed()
-    solution = least_squares(
-        residuals, first, jac=jacobian, x_scale="jac", xtol=1e-10, ftol=1e-12, gtol=1e-10, max_nfev=100
+    solution = levenberg_marquardt(residuals, jacobian, start.packed())
+    return start.unpacked(solution), jacobian(solution)
+
+
+def levenberg_marquardt(
+    residuals: Callable[[Floats], Floats], jacobian: Callable[[Floats], Floats], start: Floats
+) -> Floats:
+    """Least squares by damped normal equations, each parameter in its own scale (Marquardt 1963).
+
+    A few dozen parameters against thousands of residuals: forming ``J^T J`` costs a tenth of factoring ``J``, and what
+    its squared condition loses in a step the next step regains.
+
+    Parameters
+    ----------
+    residuals, jacobian : callables of (P,)
+        (N,) residuals in units of their noise, and their (N, P) derivatives.
+    start : (P,) array
+        Where to begin.
+
+    Raises
+    ------
+    StepError
+        If the cost still falls after `_ITERATIONS` steps, or is not finite.
+    """
+    x: Floats = start
+    r = residuals(x)
+    damping = 1e-6
+    for _ in range(_ITERATIONS):
+        J = jacobian(x)
+        scale = np.linalg.norm(J, axis=0)
+        scale[scale == 0] = 1.0
+        J /= scale
+        normal, gradient = J.T @ J, J.T @ r
+        while damping < 1e8:
+            step = np.asarray(-np.linalg.lstsq(normal + damping * np.eye(len(x)), gradient, rcond=None)[0] / scale)
+            tried = residuals(x + step)
+            if tried @ tried <= r @ r:
+                break
+            damping *= 10.0
+        else:
+            return x  # no direction lowers the cost any more: it rests to rounding
+        gained = r @ r - tried @ tried
+        x, r, damping = x + step, tried, max(0.1 * damping, 1e-12)
+        if gained < _RESTS:
+            return x
+    raise StepError(
+        f"calibration: the bundle adjustment did not converge in {_ITERATIONS} steps; check the board's shape and "
+        "add poses."
     )
-    if not solution.success or not np.isfinite(solution.x).all():
-        raise StepError(
-            f"calibration: the bundle adjustment did not converge ({solution.message}); check the board's "
-            "shape and add poses."
-        )
-    return start.unpacked(solution.x), solution.jac
 
 
 def _grouped_jacobian(residuals: Callable[[Floats], Floats], parameters: Floats, rows: Ints, n_poses: int) -> Floats:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from deskew.acquisition.bundle import INTRINSICS, Bundle, Observations, Refined, on_board, refine
@@ -106,14 +107,30 @@ def view_board(board: Board, capture: Capture, correspondence: Correspondence, n
     return BoardView(corners.reshape(-1, 2), pixels, projected, capture.camera_size, capture.projector_size, blurs)
 
 
-def _inside_white(board: Board, corners: Floats, lit: Floats) -> np.ndarray:
-    """Mask of the camera pixels well inside the white squares between the inner corners, (height, width)."""
+def _in_squares(board: Board, corners: Floats, pixels: Floats) -> Floats:
+    """Places of camera pixels (..., 2) on the board, counted in squares from its first inner corner, (..., 2)."""
     nx, ny = board.shape
     indices = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2).astype(np.float64)
     homography, _ = cv2.findHomography(corners.reshape(-1, 2), indices)
+    return np.asarray(cv2.perspectiveTransform(pixels.reshape(-1, 1, 2), homography)).reshape(pixels.shape)
+
+
+def _squares(board: Board, views: Sequence[BoardView]) -> npt.NDArray[np.intp]:
+    """Count the squares over all views, and return the one that each pixel lies in, (S,)."""
+    nx, ny = board.shape
+    numbers = []
+    for i, view in enumerate(views):
+        place = np.floor(_in_squares(board, view.corners, view.pixels)).astype(np.intp)
+        numbers.append((i * ny + place[:, 1]) * nx + place[:, 0])
+    return np.concatenate(numbers)
+
+
+def _inside_white(board: Board, corners: Floats, lit: Floats) -> npt.NDArray[np.bool_]:
+    """Mask of the camera pixels well inside the white squares between the inner corners, (height, width)."""
+    nx, ny = board.shape
     height, width = lit.shape
     pixels = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(np.float64)
-    place = cv2.perspectiveTransform(pixels.reshape(-1, 1, 2), homography).reshape(height, width, 2)
+    place = _in_squares(board, corners, pixels)
     square = np.floor(place)
     inner = np.abs(place - square - 0.5).max(axis=-1) < 0.5 - _MARGIN_SQUARES
     inner &= (place > 0).all(axis=-1) & (place[..., 0] < nx - 1) & (place[..., 1] < ny - 1)
@@ -166,7 +183,7 @@ def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
         pixels=np.concatenate([view.pixels for view in views]),
         projected=np.concatenate([view.projected for view in views]),
         pose=np.repeat(np.arange(len(views)), [len(view.pixels) for view in views]),
-        n_independent=len(views) * (board.shape[0] - 1) * (board.shape[1] - 1) / 2,
+        square=_squares(board, views),
     )
     camera_rms, camera, poses = _camera_alone(seen, camera_size)
     _require_different_tilts(poses)

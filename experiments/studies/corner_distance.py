@@ -179,10 +179,10 @@ class _Trial:
 
     def _measure_depth(self, raw: DepthMap, filtered: DepthMap) -> None:
         """Measure the depth map as triangulated, and as filtered where the scan was."""
-        true_z = self.truth.depth_at(restoration.undistortion_map(self.camera).astype(np.float64))
-        figures = metrics.depth_error(raw, true_z)
+        true_points = self.truth.points_at(restoration.undistortion_map(self.camera).astype(np.float64))
+        figures = metrics.depth_error(raw, true_points)
         if filtered is not raw:
-            figures |= metrics.depth_error(filtered, true_z, prefix="depth")
+            figures |= metrics.depth_error(filtered, true_points, prefix="depth")
         self.record.add("unrestored", "-", figures)
 
     def measure_restored(self, scan: Scan, method: str, *, shown: bool) -> None:

@@ -100,9 +100,9 @@ def _measure(
     with record.stage("depth", condition):
         depth = acquisition.depth_map(bench.calibration, correspondence)
     # Only the plane itself is fitted: desk beside it is none of it.
-    true_z = truth.depth_at(restoration.undistortion_map(camera).astype(np.float64))
-    deviation = acquisition.plane_deviation(acquisition.depth_points(depth, np.isfinite(true_z)))
-    record.add(condition, "-", metrics.depth_error(depth, true_z))
+    true_points = truth.points_at(restoration.undistortion_map(camera).astype(np.float64))
+    deviation = acquisition.plane_deviation(acquisition.depth_points(depth, np.isfinite(true_points[..., 0])))
+    record.add(condition, "-", metrics.depth_error(depth, true_points))
     shape = {"tilt_deg": lean_deg[0], "slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm}
     record.add(condition, "-", bench.residuals() | shape)
     record.add(

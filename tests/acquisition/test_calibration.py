@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from deskew.acquisition.bundle import Bundle, on_board
-from deskew.acquisition.calibration import BoardView, board_points, calibrate, view_board
+from deskew.acquisition.bundle import Bundle, on_board, shared_noise
+from deskew.acquisition.calibration import BoardView, _in_squares, board_points, calibrate, view_board
 from deskew.errors import InputError, StepError
 from deskew.projection import centre, project
 from deskew.types import Board, Capture, Correspondence, PatternKind, Pinhole
@@ -83,8 +83,31 @@ def test_errors_agree_with_the_stated_uncertainty():
         error = np.concatenate([_parameters(calibration.camera) - _parameters(CAMERA),
                                 _parameters(calibration.projector) - _parameters(PROJECTOR)])  # fmt: skip
         scores.append(error / [calibration.uncertainty[name] for name in names])
-    # Pixels of one square count once, so with independent noise the statement is on the safe side.
-    assert 0.15 < np.sqrt(np.mean(np.square(scores))) < 1.3
+    assert 0.75 < np.sqrt(np.mean(np.square(scores))) < 1.3
+
+
+def test_errors_that_squares_share_count_as_one_each():
+    """Where every square is 0.2 px off by itself, four times the pixels tell nothing more, and are not trusted to."""
+    stated = {}
+    for n_pixels in (300, 1200):
+        rng = np.random.default_rng(3)
+        views = _views(0.03, 0.02, n_pixels=n_pixels)
+        for i, view in enumerate(views):
+            place = np.floor(_in_squares(BOARD, view.corners, view.pixels)).astype(int)
+            own = 0.2 * rng.standard_normal((BOARD.shape[1] + 1, BOARD.shape[0] + 1, 2))
+            views[i] = replace(view, projected=view.projected + own[place[:, 1], place[:, 0]])
+        stated[n_pixels] = calibrate(BOARD, views).uncertainty["projector_fx"]
+    independent = calibrate(BOARD, _views(0.03, 0.2)).uncertainty["projector_fx"]
+    assert stated[1200] == pytest.approx(stated[300], rel=0.25)
+    assert 1.8 < stated[300] / independent < 3.2  # about the root of 300 pixels over 40 squares
+
+
+@pytest.mark.parametrize(("between", "within"), [(0.0, 0.3), (0.5, 0.3), (0.5, 0.0)])
+def test_shared_noise_weighs_a_square_s_mean_by_its_variance(between, within):
+    rng = np.random.default_rng(0)
+    square = np.repeat(np.arange(4000), 12)
+    residuals = between * rng.standard_normal((4000, 2))[square] + within * rng.standard_normal((len(square), 2))
+    assert shared_noise(residuals, square) ** 2 == pytest.approx(12 * between**2 + within**2, rel=0.05)
 
 
 def test_residuals_state_the_noise():

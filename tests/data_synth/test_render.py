@@ -273,8 +273,8 @@ def test_board_poses_span_the_volume_and_pose_0_is_the_world(rig: ds.Rig) -> Non
             assert pixels.min() > 0
             assert (pixels.max(axis=0) < np.array(device.size) - 1).all()
     assert min(heights) >= -1e-9
-    assert 65 < max(heights) < 85
-    assert 18 < max(tilts) < 25
+    assert 150 < max(heights) < 175
+    assert 33 < max(tilts) < 38
     with pytest.raises(InputError, match=r"`n` must be in \[3, 12\], got 2\."):
         ds.board_poses(2)
 

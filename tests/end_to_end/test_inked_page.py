@@ -26,10 +26,10 @@ def depth_errors(noise_scale, page):
     rig = data_synth.default_rig(noise_scale)
     known, rng = calibration(rig), np.random.default_rng(SEED)
     capture, truth = data_synth.render(rig, data_synth.crumpled(rng, slope_p90_deg=20.0), page, rng)
-    true_z = truth.depth_at(restoration.undistortion_map(rig.camera).astype(np.float64))
+    true_points = truth.points_at(restoration.undistortion_map(rig.camera).astype(np.float64))
     decoded = pipeline.decode(capture)
     corrected = acquisition.correct_ink(known, decoded, capture)
-    found = (metrics.depth_error(acquisition.depth_map(known, c), true_z) for c in (decoded, corrected))
+    found = (metrics.depth_error(acquisition.depth_map(known, c), true_points) for c in (decoded, corrected))
     return [np.array([e["depth_raw_rms_mm"], e["depth_raw_p95_mm"], e["depth_coverage"]]) for e in found]
 
 
