@@ -140,7 +140,8 @@ def calibrate(
     watched = [_watched(capture, f"pose {i:02d}") for i, capture in enumerate(captures)]
     calibration = pipeline.calibrate(board, watched)
     io.write_calibration(calibration, output)
-    _report({"calibration": str(output), "n_poses": calibration.n_poses, **calibration.residuals}, as_json, output)
+    figures = {"n_poses": calibration.n_poses, **calibration.residuals, **calibration.convergence}
+    _report({"calibration": str(output), **figures}, as_json, output)
 
 
 @app.command()

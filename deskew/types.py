@@ -225,7 +225,9 @@ class Calibration:
     camera, projector : Pinhole
         The devices.
     residuals : mapping
-        `camera_rms_px`, `projector_rms_px`, `stereo_rms_px`: root mean square of the radial reprojection error.
+        `camera_rms_px`, `projector_rms_px`, `stereo_rms_px`: root mean square of the radial reprojection error; with
+        four boards or more `held_out_camera_rms_px`, `held_out_projector_rms_px` and `held_out_length_rms` [`unit`],
+        on boards that were left out.
     uncertainty : mapping of parameter name to one standard deviation
         In the parameter's own unit.
     n_poses : int
@@ -235,6 +237,9 @@ class Calibration:
     camera_psf_px : float or None
         Standard deviation of a camera pixel's footprint, lens and pixel area together, as the boards' edges show it
         [px]; None if it is not known.
+    convergence : mapping
+        `steps` taken until the bundle rested, and the `condition` number of its scaled Jacobian: by so much the
+        worst-determined mixture of parameters is known less well than the best.
     """
 
     camera: Pinhole
@@ -244,6 +249,7 @@ class Calibration:
     n_poses: int = 0
     unit: str = "mm"
     camera_psf_px: float | None = None
+    convergence: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         psf = self.camera_psf_px

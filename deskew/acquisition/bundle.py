@@ -25,7 +25,8 @@ _POSE = 6
 _CAMERA, _PROJECTOR, _STEREO = slice(0, 8), slice(8, 16), slice(16, 22)
 _SHARED = 22  # parameters before the poses
 _REJECT_SIGMAS = 4.0
-_ROUNDS = 4  # the weights settle within them
+_REWEIGHTINGS = 3  # the weights settle within them
+_SINGULAR = 1e7  # condition from which a parameter is lost in the rounding of J^T J
 _ITERATIONS = 100
 _RESTS = 1e-6  # gain of a step, in noise variances: no parameter then moves by a 1000th of its deviation
 
@@ -103,15 +104,43 @@ class Refined:
         Likewise [projector px].
     kept : (S,) bool array
         Pixels that are not outliers.
-    deviations : (22 + 6 P,) array
-        One standard deviation of each parameter.
+    jacobian : (2 P N + 2 K, 22 + 6 P) array
+        Derivatives of all residuals in units of their noise: corners, then kept pixels, as they are raveled.
+    sigmas : (2,) tuple
+        Those units: of a corner [camera px] and of a pixel [projector px].
+    steps : int
+        Of the least squares, until they rested.
     """
 
     bundle: Bundle
     corner_residuals: Floats
     pixel_residuals: Floats
     kept: npt.NDArray[np.bool_]
-    deviations: Floats
+    jacobian: Floats
+    sigmas: tuple[float, float]
+    steps: int
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the Jacobian with its columns brought to unit length; infinite if it is singular."""
+        return float(np.linalg.cond(self.jacobian / np.linalg.norm(self.jacobian, axis=0)))
+
+    def deviations(self) -> Floats:
+        """One standard deviation of each parameter, (22 + 6 P,).
+
+        Raises
+        ------
+        StepError
+            If the poses leave a parameter undetermined.
+        """
+        scale = np.linalg.norm(self.jacobian, axis=0)
+        scaled = self.jacobian / scale
+        if not self.condition < _SINGULAR:
+            raise StepError(
+                "calibration: the poses leave a parameter undetermined; add poses tilted by 15 to 30 degrees about "
+                "different axes and at different heights."
+            )
+        return np.asarray(np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / scale)
 
 
 def _intrinsics(device: Pinhole) -> Floats:
@@ -156,14 +185,22 @@ def refine(start: Bundle, seen: Observations) -> Refined:
     kept = np.ones(len(seen.pixels), dtype=bool)
     # Until the residuals say how far they agree, the pixels of a square count as one.
     sigmas = (1.0, float(np.sqrt(len(seen.pixels) / len(np.unique(seen.square)))))
-    bundle = start
-    for _ in range(_ROUNDS):
-        bundle, jacobian = _solve(bundle, _subset(seen, kept), sigmas)
-        corner, pixel = corner_residuals(bundle, seen), pixel_residuals(bundle, seen)
-        sigma_pixel = 1.4826 * float(np.median(np.abs(pixel)))
-        kept = np.abs(pixel).max(axis=-1) < _REJECT_SIGMAS * _floor(sigma_pixel)
-        sigmas = (_floor(float(np.sqrt(np.mean(corner**2)))), _floor(shared_noise(pixel[kept], seen.square[kept])))
-    return Refined(bundle, corner, pixel, kept, _deviations(jacobian))
+    bundle, jacobian, steps = _solve(start, seen, sigmas)
+    for _ in range(_REWEIGHTINGS):
+        kept, sigmas = _weights(bundle, seen)
+        bundle, jacobian, taken = _solve(bundle, _subset(seen, kept), sigmas)
+        steps += taken
+    corner, pixel = corner_residuals(bundle, seen), pixel_residuals(bundle, seen)
+    return Refined(bundle, corner, pixel, kept, jacobian, sigmas, steps)
+
+
+def _weights(bundle: Bundle, seen: Observations) -> tuple[npt.NDArray[np.bool_], tuple[float, float]]:
+    """Return the pixels that are no outliers and the noise of a corner and of a pixel, as a solution shows them."""
+    corner, pixel = corner_residuals(bundle, seen), pixel_residuals(bundle, seen)
+    spread = _floor(1.4826 * float(np.median(np.abs(pixel))))
+    kept = np.abs(pixel).max(axis=-1) < _REJECT_SIGMAS * spread
+    noise = shared_noise(pixel[kept], seen.square[kept])
+    return kept, (_floor(float(np.sqrt(np.mean(corner**2)))), _floor(noise))
 
 
 def shared_noise(residuals: Floats, square: Ints) -> float:
@@ -193,18 +230,6 @@ def shared_noise(residuals: Floats, square: Ints) -> float:
     return float(np.sqrt(max(explained / (2 * len(counts)), within)))
 
 
-def _deviations(jacobian: Floats) -> Floats:
-    """One standard deviation of each parameter, from the Jacobian of residuals in units of their noise."""
-    scale = np.linalg.norm(jacobian, axis=0)
-    normal = (jacobian / scale).T @ (jacobian / scale)
-    if not np.linalg.cond(normal) < 1e14:
-        raise StepError(
-            "calibration: the poses leave a parameter undetermined; add poses tilted by 15 to 30 degrees about "
-            "different axes and at different heights."
-        )
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(normal))) / scale)
-
-
 def _floor(sigma_px: float) -> float:
     return max(sigma_px, 1e-3)  # noise-free data must not divide by zero
 
@@ -219,8 +244,8 @@ def _subset(seen: Observations, kept: npt.NDArray[np.bool_]) -> Observations:
     )
 
 
-def _solve(start: Bundle, seen: Observations, sigmas: tuple[float, float]) -> tuple[Bundle, Floats]:
-    """Solve one weighted least-squares problem; returns the solution and its Jacobian."""
+def _solve(start: Bundle, seen: Observations, sigmas: tuple[float, float]) -> tuple[Bundle, Floats, int]:
+    """Solve one weighted least-squares problem; returns the solution, its Jacobian and the steps it took."""
 
     def residuals(parameters: Floats) -> Floats:
         bundle = start.unpacked(parameters)
@@ -233,13 +258,13 @@ def _solve(start: Bundle, seen: Observations, sigmas: tuple[float, float]) -> tu
     def jacobian(parameters: Floats) -> Floats:
         return _grouped_jacobian(residuals, parameters, rows, n_poses)
 
-    solution = levenberg_marquardt(residuals, jacobian, start.packed())
-    return start.unpacked(solution), jacobian(solution)
+    solution, steps = levenberg_marquardt(residuals, jacobian, start.packed())
+    return start.unpacked(solution), jacobian(solution), steps
 
 
 def levenberg_marquardt(
     residuals: Callable[[Floats], Floats], jacobian: Callable[[Floats], Floats], start: Floats
-) -> Floats:
+) -> tuple[Floats, int]:
     """Least squares by damped normal equations, each parameter in its own scale (Marquardt 1963).
 
     A few dozen parameters against thousands of residuals: forming ``J^T J`` costs a tenth of factoring ``J``, and what
@@ -252,6 +277,11 @@ def levenberg_marquardt(
     start : (P,) array
         Where to begin.
 
+    Returns
+    -------
+    (P,) array and int
+        The parameters at rest, and the steps taken.
+
     Raises
     ------
     StepError
@@ -260,7 +290,7 @@ def levenberg_marquardt(
     x: Floats = start
     r = residuals(x)
     damping = 1e-6
-    for _ in range(_ITERATIONS):
+    for taken in range(_ITERATIONS):
         J = jacobian(x)
         scale = np.linalg.norm(J, axis=0)
         scale[scale == 0] = 1.0
@@ -273,11 +303,11 @@ def levenberg_marquardt(
                 break
             damping *= 10.0
         else:
-            return x  # no direction lowers the cost any more: it rests to rounding
+            return x, taken  # no direction lowers the cost any more: it rests to rounding
         gained = r @ r - tried @ tried
         x, r, damping = x + step, tried, max(0.1 * damping, 1e-12)
         if gained < _RESTS:
-            return x
+            return x, taken + 1
     raise StepError(
         f"calibration: the bundle adjustment did not converge in {_ITERATIONS} steps; check the board's shape and "
         "add poses."

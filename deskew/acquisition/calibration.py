@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from deskew.acquisition.bundle import INTRINSICS, Bundle, Observations, Refined, on_board, refine
 from deskew.acquisition.corners import find_board
 from deskew.acquisition.grey import grey_levels
+from deskew.acquisition.holdout import held_out
 from deskew.acquisition.psf import camera_psf, edge_blurs
 from deskew.errors import StepError, require, require_whole
 from deskew.types import Board, Calibration, Capture, Correspondence, Floats, Pinhole, Size
@@ -156,7 +157,8 @@ def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
     Calibration
         Devices and one standard deviation of each parameter. The residuals are radial: `camera_rms_px` of the camera
         calibrated alone on its corners, `projector_rms_px` of the projector alone on decoded pixels (each board's pose
-        free), `stereo_rms_px` of the joint solution, pooled over both devices.
+        free), `stereo_rms_px` of the joint solution, pooled over both devices; from four poses on the figures of
+        :func:`deskew.acquisition.holdout.held_out`, on boards left out.
 
     Raises
     ------
@@ -189,9 +191,12 @@ def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
     _require_different_tilts(poses)
     projector_rms, projector = _projector_alone(seen, camera, poses, projector_size)
     solved = refine(Bundle(camera, projector, poses), seen)
-    alone = {"camera_rms_px": camera_rms, "projector_rms_px": projector_rms}
+    residuals = {"camera_rms_px": camera_rms, "projector_rms_px": projector_rms}
+    # Both devices count alike, however many pixels were decoded.
+    both = (_radial_rms(solved.corner_residuals), _radial_rms(solved.pixel_residuals[solved.kept]))
+    residuals |= {"stereo_rms_px": float(np.sqrt(np.mean(np.square(both)))), **held_out(solved, seen)}
     psf = camera_psf(np.concatenate([view.edge_blurs for view in views]))
-    return replace(_calibration(solved, board, alone), camera_psf_px=psf)
+    return replace(_calibration(solved, board, residuals), camera_psf_px=psf)
 
 
 def _camera_alone(seen: Observations, size: Size) -> tuple[float, Pinhole, Floats]:
@@ -270,8 +275,8 @@ def _brown(distortion: Floats) -> Floats:
     return np.asarray(distortion, dtype=np.float64).ravel()[:5]
 
 
-def _calibration(solved: Refined, board: Board, alone: dict[str, float]) -> Calibration:
-    """Move the world to board pose 00 and state residuals and uncertainties."""
+def _calibration(solved: Refined, board: Board, residuals: dict[str, float]) -> Calibration:
+    """Move the world to board pose 00 and state residuals, uncertainties and how the bundle came to rest."""
     bundle = solved.bundle
     R = Rotation.from_rotvec(bundle.poses[0, :3]).as_matrix()
     t = bundle.poses[0, 3:]
@@ -279,11 +284,11 @@ def _calibration(solved: Refined, board: Board, alone: dict[str, float]) -> Cali
     projector = replace(bundle.projector, R=bundle.projector.R @ R, t=bundle.projector.R @ t + bundle.projector.t)
     names = [f"{device}_{name}" for device in ("camera", "projector") for name in INTRINSICS]
     names += [f"stereo_{name}" for name in ("rx", "ry", "rz", "tx", "ty", "tz")]
-    uncertainty = dict(zip(names, map(float, solved.deviations), strict=False))
-    # Both devices count alike, however many pixels were decoded.
-    both = (_radial_rms(solved.corner_residuals), _radial_rms(solved.pixel_residuals[solved.kept]))
-    residuals = {**alone, "stereo_rms_px": float(np.sqrt(np.mean(np.square(both))))}
-    return Calibration(camera, projector, residuals, uncertainty, n_poses=len(bundle.poses), unit=board.unit)
+    uncertainty = dict(zip(names, map(float, solved.deviations()), strict=False))
+    convergence = {"steps": float(solved.steps), "condition": solved.condition}
+    return Calibration(
+        camera, projector, residuals, uncertainty, len(bundle.poses), board.unit, convergence=convergence
+    )
 
 
 def _radial_rms(residuals: Floats) -> float:

@@ -15,6 +15,7 @@ from deskew.types import Calibration, Pinhole
 CALIBRATION_VERSION = 1
 
 _RESIDUALS = ("camera_rms_px", "projector_rms_px", "stereo_rms_px")
+_HELD_OUT = ("held_out_camera_rms_px", "held_out_projector_rms_px", "held_out_length_rms")
 _DEVICE = ("size_px", "K", "distortion", "R", "t")
 
 
@@ -64,9 +65,12 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
     require(path.suffix.lower() == ".json", str(path), "end in .json", path.suffix or "no suffix")
     residuals = {key: float(value) for key, value in calibration.residuals.items()}
     uncertainty = {key: float(value) for key, value in calibration.uncertainty.items()}
-    require(set(residuals) == set(_RESIDUALS), "residuals", f"be {', '.join(_RESIDUALS)}", ", ".join(residuals))
-    _require_deviations(residuals, "residuals")
-    _require_deviations(uncertainty, "uncertainty")
+    convergence = {key: float(value) for key, value in calibration.convergence.items()}
+    named = set(_RESIDUALS) <= set(residuals) <= {*_RESIDUALS, *_HELD_OUT}
+    wanted = f"be {', '.join(_RESIDUALS)}, and may be {', '.join(_HELD_OUT)}"
+    require(named, "residuals", wanted, ", ".join(residuals))
+    for name, group in (("residuals", residuals), ("uncertainty", uncertainty), ("convergence", convergence)):
+        _require_deviations(group, name)
     values = {
         "version": CALIBRATION_VERSION,
         "unit": calibration.unit,
@@ -75,6 +79,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         "projector": _device_values(calibration.projector),
         "residuals": residuals,
         "uncertainty": uncertainty,
+        "convergence": convergence,
     }
     if calibration.camera_psf_px is not None:
         values["camera_psf_px"] = float(calibration.camera_psf_px)
@@ -87,7 +92,7 @@ def read_calibration(path: Path) -> Calibration:
     Parameters
     ----------
     path : Path
-        As :func:`write_calibration` left it; `uncertainty` and `camera_psf_px` may be absent.
+        As :func:`write_calibration` left it; `uncertainty`, `convergence` and `camera_psf_px` may be absent.
 
     Returns
     -------
@@ -101,15 +106,17 @@ def read_calibration(path: Path) -> Calibration:
     """
     path = Path(path)
     fields = Fields(read_json(path), str(path))
-    fields.only(("version", "unit", "n_poses", "camera", "projector", "residuals"), ("uncertainty", "camera_psf_px"))
+    optional = ("uncertainty", "convergence", "camera_psf_px")
+    fields.only(("version", "unit", "n_poses", "camera", "projector", "residuals"), optional)
     fields.version("version", CALIBRATION_VERSION)
     residuals = fields.table("residuals")
-    residuals.only(_RESIDUALS)
+    residuals.only(_RESIDUALS, _HELD_OUT)
     return Calibration(
         camera=_device(fields.table("camera")),
         projector=_device(fields.table("projector")),
         residuals=residuals.deviations(),
         uncertainty=fields.table("uncertainty").deviations() if "uncertainty" in fields.values else {},
+        convergence=fields.table("convergence").deviations() if "convergence" in fields.values else {},
         n_poses=fields.integer("n_poses", 0, 1 << 20),
         unit=fields.word("unit"),
         camera_psf_px=fields.positive("camera_psf_px") if "camera_psf_px" in fields.values else None,

@@ -39,7 +39,8 @@ def same(a: Calibration, b: Calibration) -> bool:
     return (
         all(getattr(x, n).tobytes() == getattr(y, n).tobytes() for x, y in devices for n in arrays)
         and all(x.size == y.size for x, y in devices)
-        and (a.residuals, a.uncertainty, a.n_poses, a.unit) == (b.residuals, b.uncertainty, b.n_poses, b.unit)
+        and (a.residuals, a.uncertainty, a.convergence) == (b.residuals, b.uncertainty, b.convergence)
+        and (a.n_poses, a.unit) == (b.n_poses, b.unit)
         and a.camera_psf_px == b.camera_psf_px
     )
 
@@ -74,7 +75,8 @@ def test_every_number_survives_exactly(
 def test_the_file_states_version_and_unit(tmp_path: Path, calibration: Calibration) -> None:
     write_calibration(calibration, tmp_path / "c.json")
     values = json.loads((tmp_path / "c.json").read_text())
-    assert list(values) == ["version", "unit", "n_poses", "camera", "projector", "residuals", "uncertainty"]
+    parts = ["version", "unit", "n_poses", "camera", "projector", "residuals", "uncertainty", "convergence"]
+    assert list(values) == parts
     assert list(values["camera"]) == ["size_px", "K", "distortion", "R", "t"]
     assert (values["version"], values["unit"], values["camera"]["size_px"]) == (1, "mm", [12, 8])
 
@@ -85,6 +87,16 @@ def test_uncertainty_may_be_left_out(tmp_path: Path, calibration: Calibration) -
     del values["uncertainty"]
     (tmp_path / "c.json").write_text(json.dumps(values))
     assert same(read_calibration(tmp_path / "c.json"), replace(calibration, uncertainty={}))
+
+
+def test_figures_on_left_out_boards_and_the_convergence_survive(tmp_path: Path, calibration: Calibration) -> None:
+    held_out = {"held_out_camera_rms_px": 0.11, "held_out_projector_rms_px": 0.2, "held_out_length_rms": 0.003}
+    residuals = {**calibration.residuals, **held_out}
+    full = replace(calibration, residuals=residuals, convergence={"steps": 14.0, "condition": 812.5})
+    write_calibration(full, tmp_path / "c.json")
+    assert same(read_calibration(tmp_path / "c.json"), full)
+    with pytest.raises(InputError, match=r"`residuals` must be camera_rms_px, .* and may be held_out_camera_rms_px"):
+        write_calibration(replace(calibration, residuals={**residuals, "held_in": 1.0}), tmp_path / "d.json")
 
 
 def test_a_spread_that_is_not_known_is_left_out(tmp_path: Path, calibration: Calibration) -> None:
