@@ -1,0 +1,163 @@
+"""Writing: upper-case pseudo-words set in DejaVu Sans, and how much of any footprint on the page they cover."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.patches import PathPatch
+from matplotlib.textpath import TextPath
+from matplotlib.transforms import Affine2D
+
+from data_synth.sheets import PAGE_SIZE_MM
+from deskew.errors import require
+from deskew.types import Floats
+
+ALPHABET = "ABCDEFGHKLMNOPRSTUWXYZ"
+"""22 letters: A to Z without I, J, Q and V, which readers of single characters confuse."""
+
+CELLS_PER_MM = 8
+_DRAWN_PER_MM = 16
+_MM_PER_INCH = 25.4
+# Height of DejaVu Sans's capitals over its size.
+_CAPITAL = 0.729
+# Free line between two lines of capitals, and a word's distance from the next, as shares of a capital's height.
+_GAP, _SPACE = 0.45, 0.9
+
+
+def pseudo_words(rng: np.random.Generator, n_words: int = 22, n_letters: int = 8) -> tuple[str, ...]:
+    """Draw words that no dictionary helps with; 22 words of 8 letters hold each letter of `ALPHABET` eight times.
+
+    Parameters
+    ----------
+    rng : numpy Generator
+        Of the order.
+    n_words, n_letters : int
+        Words, and letters of each; 22 x 8 = 176 letters is the paper's page (section 4.2).
+    """
+    require(n_words >= 1 and n_letters >= 1, "n_words", "be at least 1, as the letters", (n_words, n_letters))
+    needed = n_words * n_letters
+    letters = rng.permutation(np.resize(list(ALPHABET), needed))
+    return tuple("".join(letters[i : i + n_letters]) for i in range(0, needed, n_letters))
+
+
+@dataclass(frozen=True, slots=True)
+class Lettering:
+    """Lines of capitals on a page, kept as the integral of their coverage from the page's top left corner.
+
+    The letters' outlines are drawn anti-aliased at 16 cells a millimetre and averaged down to 8; between the cells'
+    corners the integral is bilinear, so the mean over any footprint is exact for what was drawn.
+
+    Attributes
+    ----------
+    lines : tuple of str
+        What is written, top to bottom.
+    page_size_mm : (width, height)
+        Page [mm].
+    integral : (h + 1, w + 1) array
+        Covered area from the corner (0, 0) to each corner of a cell [cells].
+    """
+
+    lines: tuple[str, ...]
+    page_size_mm: tuple[float, float]
+    integral: Floats
+
+    def coverage(self, u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
+        """Share of footprints of sides `du` x `dv` [mm] centred on (u, v) [mm] that is covered: (N,), in [0, 1]."""
+        half_u, half_v = np.maximum(du, 1e-3) / 2, np.maximum(dv, 1e-3) / 2
+        left, right, top, bottom = u - half_u, u + half_u, v - half_v, v + half_v
+        covered = self._to(right, bottom) - self._to(left, bottom) - self._to(right, top) + self._to(left, top)
+        return np.asarray(np.clip(covered / (4 * half_u * half_v * CELLS_PER_MM**2), 0.0, 1.0))
+
+    def _to(self, u: Floats, v: Floats) -> Floats:
+        """Covered area from the corner to (u, v), by bilinear interpolation [cells]."""
+        rows, columns = self.integral.shape
+        x = np.clip(np.asarray(u, dtype=np.float64) * CELLS_PER_MM, 0.0, columns - 1.0)
+        y = np.clip(np.asarray(v, dtype=np.float64) * CELLS_PER_MM, 0.0, rows - 1.0)
+        c, r = np.minimum(x.astype(np.intp), columns - 2), np.minimum(y.astype(np.intp), rows - 2)
+        a, b = x - c, y - r
+        upper = (1 - a) * self.integral[r, c] + a * self.integral[r, c + 1]
+        lower = (1 - a) * self.integral[r + 1, c] + a * self.integral[r + 1, c + 1]
+        return np.asarray((1 - b) * upper + b * lower)
+
+
+def set_words(
+    words: Sequence[str],
+    page_size_mm: tuple[float, float] = PAGE_SIZE_MM,
+    *,
+    capital_mm: float = 10.0,
+    margin_mm: float = 16.0,
+) -> Lettering:
+    """Set words in lines, from the top left, with ragged lines spread evenly over the page's height.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Upper-case words.
+    page_size_mm : (width, height)
+        Page [mm].
+    capital_mm : float
+        Height of a capital [mm]; 10 mm are 21 camera pixels on the default rig.
+    margin_mm : float
+        Free border all round [mm].
+
+    Raises
+    ------
+    InputError
+        If the words do not fit on the page.
+    """
+    require(bool(words) and all(words), "words", "be at least one word", list(words))
+    require(capital_mm > 0 and margin_mm >= 0, "capital_mm", "be positive, the margin not negative", capital_mm)
+    room = page_size_mm[0] - 2 * margin_mm
+    glyphs = [_outline(word, capital_mm) for word in words]
+    lines: list[list[int]] = [[]]
+    at = 0.0
+    for i, (_, width) in enumerate(glyphs):
+        require(width <= room, "words", f"fit in {room:.0f} mm at {capital_mm:g} mm a capital", f"{words[i]!r}")
+        if lines[-1] and at + width > room:
+            lines.append([])
+            at = 0.0
+        lines[-1].append(i)
+        at += width + _SPACE * capital_mm
+    pitch = (page_size_mm[1] - 2 * margin_mm - capital_mm) / max(len(lines) - 1, 1)
+    tight = len(lines) > 1 and pitch < (1 + _GAP) * capital_mm
+    require(not tight, "words", f"fit on {page_size_mm} mm at {capital_mm:g} mm a capital", f"{len(lines)} lines")
+    placed = []
+    for row, line in enumerate(lines):
+        at = margin_mm
+        for i in line:
+            placed.append((glyphs[i][0], at, margin_mm + capital_mm + row * pitch))
+            at += glyphs[i][1] + _SPACE * capital_mm
+    written = tuple(" ".join(words[i] for i in line) for line in lines)
+    return Lettering(written, page_size_mm, _integral(placed, page_size_mm))
+
+
+def _outline(word: str, capital_mm: float) -> tuple[TextPath, float]:
+    """Return a word's outline with its baseline's start at the origin, y up [mm], and its width [mm]."""
+    path = TextPath((0, 0), word, size=capital_mm / _CAPITAL, prop=FontProperties(family="DejaVu Sans"))
+    return path, float(path.get_extents().x1)
+
+
+def _integral(placed: Sequence[tuple[TextPath, float, float]], page_size_mm: tuple[float, float]) -> Floats:
+    """Draw outlines with their baselines' starts at (u, v) and integrate what they cover."""
+    width, height = (int(np.ceil(extent * CELLS_PER_MM)) for extent in page_size_mm)
+    fine = _DRAWN_PER_MM // CELLS_PER_MM
+    drawn_mm = width / CELLS_PER_MM, height / CELLS_PER_MM
+    figure = Figure(figsize=tuple(extent / _MM_PER_INCH for extent in drawn_mm), dpi=_DRAWN_PER_MM * _MM_PER_INCH)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, drawn_mm[0]), ylim=(-drawn_mm[1], 0))
+    axes.axis("off")
+    for path, u, v in placed:
+        moved = path.transformed(Affine2D().translate(u, -v))
+        axes.add_patch(PathPatch(moved, facecolor="black", linewidth=0))
+    canvas.draw()
+    ink = 1.0 - np.asarray(canvas.buffer_rgba())[: height * fine, : width * fine, 0] / 255.0
+    cells = ink.reshape(height, fine, width, fine).mean(axis=(1, 3))
+    integral = np.zeros((height + 1, width + 1))
+    integral[1:, 1:] = cells.cumsum(axis=0).cumsum(axis=1)
+    return integral
