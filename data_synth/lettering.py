@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from io import BytesIO
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.patches import PathPatch
-from matplotlib.textpath import TextPath
+from matplotlib.textpath import TextPath, text_to_path
 from matplotlib.transforms import Affine2D
 
 from data_synth.sheets import PAGE_SIZE_MM
@@ -58,12 +59,18 @@ class Lettering:
         What is written, top to bottom.
     page_size_mm : (width, height)
         Page [mm].
+    letters : tuple of (letter, u, v, width)
+        Each letter with the left end of its baseline and its advance [mm].
+    capital_mm : float
+        Height of a capital [mm].
     integral : (h + 1, w + 1) array
         Covered area from the corner (0, 0) to each corner of a cell [cells].
     """
 
     lines: tuple[str, ...]
     page_size_mm: tuple[float, float]
+    letters: tuple[tuple[str, float, float, float], ...]
+    capital_mm: float
     integral: Floats
 
     def coverage(self, u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
@@ -113,50 +120,72 @@ def set_words(
     require(bool(words) and all(words), "words", "be at least one word", list(words))
     require(capital_mm > 0 and margin_mm >= 0, "capital_mm", "be positive, the margin not negative", capital_mm)
     room = page_size_mm[0] - 2 * margin_mm
-    glyphs = [_outline(word, capital_mm) for word in words]
-    lines: list[list[int]] = [[]]
+    lines: list[list[str]] = [[]]
     at = 0.0
-    for i, (_, width) in enumerate(glyphs):
-        require(width <= room, "words", f"fit in {room:.0f} mm at {capital_mm:g} mm a capital", f"{words[i]!r}")
+    for word in words:
+        width = sum(_advance(letter, capital_mm) for letter in word)
+        require(width <= room, "words", f"fit in {room:.0f} mm at {capital_mm:g} mm a capital", repr(word))
         if lines[-1] and at + width > room:
             lines.append([])
             at = 0.0
-        lines[-1].append(i)
+        lines[-1].append(word)
         at += width + _SPACE * capital_mm
     pitch = (page_size_mm[1] - 2 * margin_mm - capital_mm) / max(len(lines) - 1, 1)
     tight = len(lines) > 1 and pitch < (1 + _GAP) * capital_mm
     require(not tight, "words", f"fit on {page_size_mm} mm at {capital_mm:g} mm a capital", f"{len(lines)} lines")
-    placed = []
-    for row, line in enumerate(lines):
+    written = tuple(" ".join(line) for line in lines)
+    letters = []
+    for row, line in enumerate(written):
         at = margin_mm
-        for i in line:
-            placed.append((glyphs[i][0], at, margin_mm + capital_mm + row * pitch))
-            at += glyphs[i][1] + _SPACE * capital_mm
-    written = tuple(" ".join(words[i] for i in line) for line in lines)
-    return Lettering(written, page_size_mm, _integral(placed, page_size_mm))
+        for letter in line:
+            width = _SPACE * capital_mm if letter == " " else _advance(letter, capital_mm)
+            if letter != " ":
+                letters.append((letter, at, margin_mm + capital_mm + row * pitch, width))
+            at += width
+    integral = _integral(letters, capital_mm, page_size_mm)
+    return Lettering(written, page_size_mm, tuple(letters), capital_mm, integral)
 
 
-def _outline(word: str, capital_mm: float) -> tuple[TextPath, float]:
-    """Return a word's outline with its baseline's start at the origin, y up [mm], and its width [mm]."""
-    path = TextPath((0, 0), word, size=capital_mm / _CAPITAL, prop=FontProperties(family="DejaVu Sans"))
-    return path, float(path.get_extents().x1)
+def glyph(letter: str, capital_mm: float) -> Lettering:
+    """Return one letter alone, with a letter's height of white round it: the pattern that a reader compares with."""
+    width = _advance(letter, capital_mm)
+    size = (width + 2 * capital_mm, 3 * capital_mm)
+    letters = ((letter, capital_mm, 2 * capital_mm, width),)
+    return Lettering((letter,), size, letters, capital_mm, _integral(letters, capital_mm, size))
 
 
-def _integral(placed: Sequence[tuple[TextPath, float, float]], page_size_mm: tuple[float, float]) -> Floats:
-    """Draw outlines with their baselines' starts at (u, v) and integrate what they cover."""
+_FONT = FontProperties(family="DejaVu Sans")
+
+
+def _advance(letter: str, capital_mm: float) -> float:
+    """Width that a letter takes in a line [mm]."""
+    size = capital_mm / _CAPITAL
+    font = _FONT.copy()
+    font.set_size(100.0)
+    return float(text_to_path.get_text_width_height_descent(letter, font, ismath=False)[0]) * size / 100.0
+
+
+def _integral(
+    letters: Sequence[tuple[str, float, float, float]], capital_mm: float, page_size_mm: tuple[float, float]
+) -> Floats:
+    """Draw letters with their baselines' starts at (u, v) and integrate what they cover."""
     width, height = (int(np.ceil(extent * CELLS_PER_MM)) for extent in page_size_mm)
     fine = _DRAWN_PER_MM // CELLS_PER_MM
     drawn_mm = width / CELLS_PER_MM, height / CELLS_PER_MM
-    figure = Figure(figsize=tuple(extent / _MM_PER_INCH for extent in drawn_mm), dpi=_DRAWN_PER_MM * _MM_PER_INCH)
-    canvas = FigureCanvasAgg(figure)
+    inches = drawn_mm[0] / _MM_PER_INCH, drawn_mm[1] / _MM_PER_INCH
+    figure = Figure(figsize=inches, dpi=_DRAWN_PER_MM * _MM_PER_INCH)
+    FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, drawn_mm[0]), ylim=(-drawn_mm[1], 0))
     axes.axis("off")
-    for path, u, v in placed:
-        moved = path.transformed(Affine2D().translate(u, -v))
+    outlines = {c: TextPath((0, 0), c, size=capital_mm / _CAPITAL, prop=_FONT) for c, *_ in letters}
+    for letter, u, v, _ in letters:
+        moved = outlines[letter].transformed(Affine2D().translate(u, -v))
         axes.add_patch(PathPatch(moved, facecolor="black", linewidth=0))
-    canvas.draw()
-    ink = 1.0 - np.asarray(canvas.buffer_rgba())[: height * fine, : width * fine, 0] / 255.0
+    drawn = BytesIO()
+    figure.savefig(drawn, format="rgba", dpi="figure")
+    pixels = np.frombuffer(drawn.getvalue(), dtype=np.uint8).reshape(height * fine, width * fine, 4)
+    ink = 1.0 - pixels[..., 0] / 255.0
     cells = ink.reshape(height, fine, width, fine).mean(axis=(1, 3))
     integral = np.zeros((height + 1, width + 1))
     integral[1:, 1:] = cells.cumsum(axis=0).cumsum(axis=1)
