@@ -5,7 +5,7 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
-from data_synth.lettering import pseudo_words
+from data_synth.lettering import glyph, pseudo_words
 from data_synth.lights import Format, Light, standard_lights
 from data_synth.manuscript import Layer, Lettered, Manuscript, hidden_manuscript
 from data_synth.pages import Blank, Checkerboard, Page, board_page
@@ -37,6 +37,7 @@ __all__ = [
     "default_rig",
     "dome",
     "flat_sheet",
+    "glyph",
     "hidden_manuscript",
     "photograph",
     "plane",

@@ -15,6 +15,8 @@ from deskew.types import Floats
 
 # How far a stroke that a stylus pressed into the page leans at its flanks, as a slope, and how wide a flank is [mm].
 _STROKE_SLOPE, _FLANK_MM = 0.12, 0.5
+RAKING_BEARING = (-1.0, 0.0)
+"""Direction from the page to the standard raking lamp, in page coordinates."""
 
 
 class Layer(StrEnum):
@@ -91,7 +93,7 @@ class Manuscript:
         """Return what white light and the projector show: the print alone."""
         return self.visible.albedo(u, v, du, dv)
 
-    def under(self, layer: Layer, bearing: tuple[float, float] = (1.0, 0.0), cotangent: float = 0.0) -> Page:
+    def under(self, layer: Layer, bearing: tuple[float, float] = RAKING_BEARING, cotangent: float = 0.0) -> Page:
         """Return the page as one light sees it.
 
         Parameters
@@ -105,10 +107,15 @@ class Manuscript:
         """
         return _Face(self, layer, bearing, cotangent)
 
-    def writing(self, layer: Layer, u: Floats, v: Floats, cell_mm: float) -> Floats:
-        """Coverage by a layer's hidden text over cells of `cell_mm` at page points (u, v) [mm]; for metrics alone."""
-        side = np.full(np.shape(u), cell_mm)
-        return self.hidden[layer].coverage(u, v, side, side)
+    def writing(self, layer: Layer, u: Floats, v: Floats, side: Floats) -> Floats:
+        """Return what a layer's hidden text adds at page points (u, v), over cells of `side` [mm]: (N,)."""
+        return self.pattern(layer, self.hidden[layer], u, v, side)
+
+    def pattern(self, layer: Layer, text: Lettering, u: Floats, v: Floats, side: Floats) -> Floats:
+        """Return how a text shows in a layer, up to a factor: as it covers the page, or as its strokes' flanks lean."""
+        if layer is Layer.RELIEF:
+            return flank_lean(text, RAKING_BEARING, u, v, side, side)
+        return text.coverage(u, v, side, side)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,16 +140,18 @@ class _Face:
             level += (_HIDDEN[layer] - level) * manuscript.hidden[layer].coverage(u, v, du, dv)
         level += (_INK[layer] - level) * ink
         if layer is Layer.RELIEF:
-            level *= 1.0 + self._lean(u, v, du, dv)
+            text = manuscript.hidden[layer]
+            level *= 1.0 + self.cotangent * _STROKE_SLOPE * flank_lean(text, self.bearing, u, v, du, dv)
         return level
 
-    def _lean(self, u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
-        """Relative gain of light where a pressed stroke's flanks lean to the lamp: -cot(height) grad h . bearing."""
-        text = self.manuscript.hidden[Layer.RELIEF]
-        a, b = (_FLANK_MM / 2 * part for part in self.bearing)
-        # The stroke lies below the page, so the flank away from the lamp faces it.
-        rise = text.coverage(u - a, v - b, du, dv) - text.coverage(u + a, v + b, du, dv)
-        return self.cotangent * _STROKE_SLOPE * rise
+
+def flank_lean(text: Lettering, bearing: tuple[float, float], u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
+    """How far the flanks of pressed strokes lean to a lamp, in -1 to 1: light there gains cot(height) slope times it.
+
+    The stroke lies below the page, so it is the flank away from the lamp that faces it.
+    """
+    a, b = (_FLANK_MM / 2 * part for part in bearing)
+    return text.coverage(u - a, v - b, du, dv) - text.coverage(u + a, v + b, du, dv)
 
 
 def hidden_manuscript(rng: np.random.Generator, page_size_mm: tuple[float, float] = PAGE_SIZE_MM) -> Manuscript:
