@@ -147,7 +147,7 @@ def span(
 ) -> Scan:
     """Span a mesh over a page whose depth is known: the last step of :func:`scan`, which see for the parameters."""
     if outline is None:
-        outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask)
+        outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask, depth_map)
     mesh = acquisition.page_mesh(depth_map, outline, shape, max_hole_px=max_hole_px)
     images = {WHITE: capture.white, **capture.textures}
     return Scan(images, depth_map, calibration.camera, mesh.sheet, outline.corners)

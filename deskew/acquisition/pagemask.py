@@ -104,6 +104,22 @@ def largest_filled(mask: npt.NDArray[Any]) -> Mask:
     return np.asarray(ndimage.binary_fill_holes(labels == int(sizes.argmax())), dtype=bool)
 
 
+def one_page(mask: Mask) -> Mask:
+    """Return the one whole page that a mask of scattered finds shows: closed, filled, opened and checked.
+
+    Raises
+    ------
+    StepError
+        If it cannot be one whole page.
+    """
+    # A dark strip of margin beside ink may be broken by noise: close it, so that the ink becomes a hole and is filled.
+    # Only then may an opening drop the specks that hang on the page by single pixels.
+    whole = largest_filled(_morphology(mask, cv2.MORPH_CLOSE))
+    page = largest_filled(_morphology(whole, cv2.MORPH_OPEN))
+    require_page_shape(page)
+    return page
+
+
 def _morphology(mask: Mask, operation: int) -> npt.NDArray[np.uint8]:
     """Open or close by a disc of 2 pixels; OpenCV's border is neutral, so a page that touches it still does."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
@@ -144,9 +160,4 @@ def page_mask(white: Array, black: Array) -> Mask:
     # Ambient light tells page from desk only if the page clears the threshold well, not when its own grain sets it.
     if ambient_contrast > 2 * threshold:
         mask |= ambient
-    # A dark strip of margin beside ink may be broken by noise: close it, so that the ink becomes a hole and is filled.
-    # Only then may an opening drop the specks that hang on the page by single pixels.
-    whole = largest_filled(_morphology(mask, cv2.MORPH_CLOSE))
-    page = largest_filled(_morphology(whole, cv2.MORPH_OPEN))
-    require_page_shape(page)
-    return page
+    return one_page(mask)

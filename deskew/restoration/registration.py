@@ -20,8 +20,9 @@ from deskew.types import Array, Floats
 # The search: width of the scan it is done at [px], scales tried about the one that the widths suggest.
 SEARCH_WIDTH_PX = 160
 SCALES = np.geomspace(0.5, 2.0, 48)
+ASPECT_STEPS = (0.03, 0.01, 0.003)
 # Side of a patch [scan px], and steps of the refinement; a patch may ask for this much in one step.
-PATCH_PX, N_STEPS, STEP_MAX_PX = 32, 10, 3.0
+PATCH_PX, PATCH_COARSE_PX, N_STEPS, STEP_MAX_PX = 32, 16, 20, 3.0
 # Images that show the same page agree better than this: correlation of a patch in the median, patches off by [scan px].
 CORRELATION_MIN, RESIDUAL_MAX_PX = 0.8, 0.25
 N_PATCHES_MIN = 12
@@ -113,27 +114,45 @@ def _edges(image: Floats) -> Floats:
 
 
 def _searched(source: Floats, target: Floats) -> tuple[Floats, Floats]:
-    """Scale, the same both ways, and offset of the best match of the edges at low resolution."""
-    width = target.shape[1]
-    coarse = min(1.0, SEARCH_WIDTH_PX / width)
-    small = cv2.resize(target, None, fx=coarse, fy=coarse, interpolation=cv2.INTER_AREA)
-    wanted = _edges(small)
-    likely = source.shape[1] / width
-    best = (-np.inf, 1.0, 0.0, 0.0)
-    for scale in likely * SCALES:
-        factor = coarse / scale
-        size = max(8, round(source.shape[1] * factor)), max(8, round(source.shape[0] * factor))
-        found = _edges(cv2.resize(source, size, interpolation=cv2.INTER_AREA))
+    """Scale and offset of the best match of the edges at low resolution: alike both ways first, then each its own."""
+    search = _Search.of(source, target)
+    likely = source.shape[1] / target.shape[1]
+    best = max((search.match(likely * s, likely * s) for s in SCALES), key=lambda match: match[0])
+    for spread in ASPECT_STEPS:
+        factors = 1.0 + spread * np.arange(-2, 3)
+        tried = [search.match(best[1] * a, best[2] * b) for a in factors for b in factors]
+        best = max(tried, key=lambda match: match[0])
+    _, sx, sy, dx, dy = best
+    scale = np.array([sx, sy])
+    # Pixel centres sit at integers: corners at (-1/2, -1/2) meet when the shift is 0.
+    return scale, np.array([dx, dy]) + (scale - 1.0) / 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """The texture, and the edges of the scan at `coarse` times its resolution."""
+
+    source: Floats
+    wanted: Floats
+    coarse: float
+
+    @classmethod
+    def of(cls, source: Floats, target: Floats) -> _Search:
+        coarse = min(1.0, SEARCH_WIDTH_PX / target.shape[1])
+        small = cv2.resize(target, None, fx=coarse, fy=coarse, interpolation=cv2.INTER_AREA)
+        return cls(source, _edges(small), coarse)
+
+    def match(self, sx: float, sy: float) -> tuple[float, float, float, float, float]:
+        """Correlation at the best shift, the scale, and that shift [texture px]."""
+        fx, fy = self.coarse / sx, self.coarse / sy
+        size = max(8, round(self.source.shape[1] * fx)), max(8, round(self.source.shape[0] * fy))
+        found, wanted = _edges(cv2.resize(self.source, size, interpolation=cv2.INTER_AREA)), self.wanted
         shape = [cv2.getOptimalDFTSize(a + b) for a, b in zip(found.shape, wanted.shape, strict=True)]
         spectrum = np.fft.rfft2(found, shape) * np.conj(np.fft.rfft2(wanted, shape))
         match = np.fft.irfft2(spectrum, shape) / (np.linalg.norm(found) * np.linalg.norm(wanted) + 1e-300)
         y, x = np.unravel_index(int(match.argmax()), match.shape)
-        if match[y, x] > best[0]:
-            shift = [i - n if i > n // 2 else i for i, n in ((x, shape[1]), (y, shape[0]))]
-            best = (float(match[y, x]), float(scale), shift[0] / factor, shift[1] / factor)
-    _, scale, dx, dy = best
-    # Pixel centres sit at integers: corners at (-1/2, -1/2) meet when the shift is 0.
-    return np.array([scale, scale]), np.array([dx, dy]) + (scale - 1.0) / 2.0
+        dx, dy = (i - n if i > n // 2 else i for i, n in ((int(x), shape[1]), (int(y), shape[0])))
+        return float(match[y, x]), sx, sy, dx / fx, dy / fy
 
 
 def _refined(source: Floats, target: Floats, scale: Floats, offset: Floats, shrink: int) -> Registration:
@@ -144,11 +163,12 @@ def _refined(source: Floats, target: Floats, scale: Floats, offset: Floats, shri
     scale, offset = np.asarray(scale * shrink), np.asarray(offset + scale * (shrink - 1) / 2)
     y, x = np.mgrid[0:height, 0:width].astype(np.float64)
     found = Registration(scale, offset)
+    side = PATCH_PX if shrink == 1 else PATCH_COARSE_PX
     for _ in range(N_STEPS):
         places = np.stack([x * scale[0] + offset[0], y * scale[1] + offset[1]], axis=-1)
         inside = ((places >= 0) & (places <= np.array(source.shape[::-1]) - 1.0)).all(axis=-1)
         warped = read_at(source, places, float(scale.mean()))
-        patches = _Patches.of(warped, small, np.asarray(inside, dtype=np.float64))
+        patches = _Patches.of(warped, small, np.asarray(inside, dtype=np.float64), side)
         found = _fitted(patches, scale, offset, (width, height))
         moved = np.abs(found.scale - scale).max() * width + np.abs(found.offset - offset).max()
         scale, offset = found.scale, found.offset
@@ -180,21 +200,21 @@ class _Patches:
     correlation: Floats
 
     @classmethod
-    def of(cls, warped: Floats, target: Floats, inside: Floats) -> _Patches:
+    def of(cls, warped: Floats, target: Floats, inside: Floats, side: int) -> _Patches:
         """Solve every patch for its shift, a gain, a level and its slopes: one step of Lucas and Kanade's.
 
         The model is ``target = gain (warped + shift . grad warped) + level + slope . x``, linear in gain * shift.
         """
         smooth, wanted = (cv2.GaussianBlur(image, (0, 0), 1.0) for image in (warped, target))
         gx, gy = np.gradient(smooth, axis=1), np.gradient(smooth, axis=0)
-        rows, columns = (n // PATCH_PX for n in target.shape)
-        ramp = np.linspace(-1.0, 1.0, PATCH_PX)
-        slope_y, slope_x = (np.broadcast_to(s.ravel(), (rows * columns, PATCH_PX**2)) for s in np.meshgrid(ramp, ramp))
-        t, w, a, b = (_cut(image, rows, columns) for image in (smooth, wanted, gx, gy))
+        rows, columns = (n // side for n in target.shape)
+        ramp = np.linspace(-1.0, 1.0, side)
+        slope_y, slope_x = (np.broadcast_to(s.ravel(), (rows * columns, side**2)) for s in np.meshgrid(ramp, ramp))
+        t, w, a, b = (_cut(image, rows, columns, side) for image in (smooth, wanted, gx, gy))
         design = np.stack([a, b, t, np.ones_like(t), slope_x, slope_y], axis=-1)
         normal = np.einsum("npi,npj->nij", design, design)
         # A ridge far below any signal keeps blank patches from being singular.
-        normal += 1e-6 * np.eye(6) * PATCH_PX**2
+        normal += 1e-6 * np.eye(6) * side**2
         solved = np.linalg.solve(normal, np.einsum("npi,np->ni", design, w)[..., None])[..., 0]
         residual = w - np.einsum("npi,ni->np", design, solved)
         variance = (residual**2).mean(axis=1) + 1e-9
@@ -206,17 +226,17 @@ class _Patches:
         varied = w - w.mean(axis=1, keepdims=True)
         total = (varied**2).mean(axis=1)
         y, x = np.mgrid[0:rows, 0:columns].reshape(2, -1)
-        centre = np.stack([x, y], axis=-1) * PATCH_PX + (PATCH_PX - 1) / 2.0
+        centre = np.stack([x, y], axis=-1) * side + (side - 1) / 2.0
         shift = np.clip(solved[:, :2] / gain[:, None], -STEP_MAX_PX, STEP_MAX_PX)
         # A patch says something if it holds a contrast beyond its noise, and lies wholly in the texture.
-        useful = _cut(inside, rows, columns).all(axis=1) & (total > 4.0)
+        useful = _cut(inside, rows, columns, side).all(axis=1) & (total > 4.0)
         correlation = np.sqrt(np.clip(1.0 - variance / (total + 1e-9), 0.0, 1.0))
         return cls(centre[useful], shift[useful], information[useful], correlation[useful])
 
 
-def _cut(image: Floats, rows: int, columns: int) -> Floats:
-    """Cut an image into its patches: (rows * columns, PATCH_PX^2)."""
-    tiles = image[: rows * PATCH_PX, : columns * PATCH_PX].reshape(rows, PATCH_PX, columns, PATCH_PX)
+def _cut(image: Floats, rows: int, columns: int, side: int) -> Floats:
+    """Cut an image into its patches: (rows * columns, side^2)."""
+    tiles = image[: rows * side, : columns * side].reshape(rows, side, columns, side)
     return np.ascontiguousarray(tiles.transpose(0, 2, 1, 3).reshape(rows * columns, -1))
 
 
