@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from deskew import projection
 from deskew.acquisition.grey import grey_levels
-from deskew.acquisition.pagemask import Mask, one_page
+from deskew.acquisition.pagemask import Mask, largest_filled, one_page
 from deskew.errors import StepError
 from deskew.types import Array, DepthMap, Floats, Pinhole
 
@@ -24,6 +25,8 @@ UNLIKE_SHARE, UNLIKE_SIGMA = 0.025, 5.0
 SHADOW_SHARE = 0.35
 # Width of a shadow's soft edge, both sides together [px].
 PENUMBRA_PX = 7
+# Notches narrower than this are pixels without depth, of the desk's own shade [px].
+NOTCH_PX = 17
 # A desk that gives back more than this share of the page's light is light: the page is no longer by far the brightest.
 LIGHT_SHARE = 0.25
 # Border over the border of the convex hull: sides of crumpled pages run in and out by less.
@@ -60,11 +63,14 @@ def light_desk_page(white: Array, black: Array, camera: Pinhole, depth: DepthMap
     low = np.abs(height) < RAISED_MM / 2
     smooth = cv2.GaussianBlur(lit, (0, 0), 1.0)
     level, scatter = _desk_light(smooth, low & ~raised)
-    difference = np.abs(smooth - level)
-    unlike = difference > np.maximum(UNLIKE_SHARE * level, UNLIKE_SIGMA * scatter)
-    # A shadow's soft edge is unlike the desk too; so is the edge of the projector's frame, beyond which all is dark.
-    shadow = cv2.dilate((smooth < SHADOW_SHARE * level).astype(np.uint8), np.ones((PENUMBRA_PX, PENUMBRA_PX), np.uint8))
-    page = one_page(raised | (unlike & (shadow == 0)))
+    margin = np.maximum(UNLIKE_SHARE * level, UNLIKE_SIGMA * scatter)
+    # A shadow's soft edge is darker than the desk too, as is that of the projector's frame: both are narrow.
+    shadow = cv2.dilate((smooth < SHADOW_SHARE * level).astype(np.uint8), _disc(PENUMBRA_PX))
+    darker = _opened((level - smooth > margin) & (shadow == 0), PENUMBRA_PX + 2)
+    found = largest_filled(_opened(raised | (smooth - level > margin) | darker, 5))
+    # With desk all round: at a border of its own OpenCV would close the page to the picture's edge.
+    framed = cv2.morphologyEx(np.pad(found, NOTCH_PX).astype(np.uint8), cv2.MORPH_CLOSE, _disc(NOTCH_PX))
+    page = one_page(framed[NOTCH_PX:-NOTCH_PX, NOTCH_PX:-NOTCH_PX] > 0)
     _require_smooth(page)
     return page
 
@@ -77,6 +83,15 @@ def is_light(white: Array, black: Array) -> bool:
         [lit[:margin].ravel(), lit[-margin:].ravel(), lit[:, :margin].ravel(), lit[:, -margin:].ravel()]
     )
     return bool(np.median(rim) > LIGHT_SHARE * np.percentile(lit, 99))
+
+
+def _disc(width: int) -> npt.NDArray[np.uint8]:
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width)), dtype=np.uint8)
+
+
+def _opened(mask: Mask, width: int) -> Mask:
+    """Drop what is narrower than a disc."""
+    return np.asarray(cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, _disc(width)) > 0)
 
 
 def _require_smooth(page: Mask) -> None:

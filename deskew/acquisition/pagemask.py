@@ -76,13 +76,13 @@ def require_page_shape(mask: Mask) -> None:
     if touched:
         raise StepError(
             f"Page outline: the page touches the picture's {' and '.join(touched)} border; "
-            "move it or the camera until desk shows all round."
+            "move it or the camera until desk shows all round, or give a mask."
         )
     share = float(mask.mean())
     if share < AREA_MIN:
         raise StepError(
             f"Page outline: the largest light region covers {share:.2%} of the picture, {AREA_MIN:.0%} needed; "
-            "move the camera closer or use a darker desk."
+            "move the camera closer, use a darker desk, or give a mask."
         )
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     contour = max(contours, key=len).reshape(-1, 1, 2)
