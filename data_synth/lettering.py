@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
 
 import numpy as np
@@ -146,6 +147,7 @@ def set_words(
     return Lettering(written, page_size_mm, tuple(letters), capital_mm, integral)
 
 
+@cache
 def glyph(letter: str, capital_mm: float) -> Lettering:
     """Return one letter alone, with a letter's height of white round it: the pattern that a reader compares with."""
     width = _advance(letter, capital_mm)

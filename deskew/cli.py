@@ -255,7 +255,7 @@ def _flat_page(folder: Path, devices: Calibration) -> tuple[DepthMap, Array]:
     capture = _open(folder)
     acquisition.require_same_devices(devices, capture)
     depth = acquisition.depth_map(devices, pipeline.decode(capture))
-    corners = acquisition.page_outline(capture.white, capture.black, devices.camera).corners
+    corners = acquisition.page_outline(capture.white, capture.black, devices.camera, depth=depth).corners
     inside = np.zeros(depth.z.shape, np.uint8)
     cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)  # a flat page's outline has four straight sides
     return depth, inside.astype(bool)

@@ -126,7 +126,7 @@ class TexturesStudy(Study):
 
 def _fine_lights(rng: np.random.Generator, size: Size) -> tuple[Light, ...]:
     """Two lights in a second format with an unknown scale, aspect and crop, which all its images share."""
-    scale = float(rng.uniform(2.85, 3.2))
+    scale = _KONTRON[0] / size[0] * float(rng.uniform(0.92, 1.02))
     aspect = float(rng.uniform(0.95, 1.05))
     both = (scale, scale * aspect)
     # What is left over of either picture, and where: a few per cent of the texture.

@@ -202,7 +202,7 @@ def test_accuracy_measures_the_page_and_not_the_desk(
     depth = DepthMap(z, np.zeros((8, 12), np.uint8), CAMERA)
     corners = np.array([[4.0, 1], [10, 1], [10, 6], [4, 6]])
     monkeypatch.setattr(acquisition, "depth_map", lambda devices, seen: depth)
-    monkeypatch.setattr(acquisition, "page_outline", lambda *images: SimpleNamespace(corners=corners))
+    monkeypatch.setattr(acquisition, "page_outline", lambda *images, depth: SimpleNamespace(corners=corners))
     code, out, err = run("accuracy page page -c c.json --json", capsys)
     assert (code, err) == (0, "")
     figures = json.loads(out)
