@@ -14,6 +14,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.patches import PathPatch
 from matplotlib.textpath import TextPath, text_to_path
 from matplotlib.transforms import Affine2D
+from numba import njit
 
 from data_synth.sheets import PAGE_SIZE_MM
 from deskew.errors import require
@@ -76,21 +77,31 @@ class Lettering:
 
     def coverage(self, u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
         """Share of footprints of sides `du` x `dv` [mm] centred on (u, v) [mm] that is covered: (N,), in [0, 1]."""
-        half_u, half_v = np.maximum(du, 1e-3) / 2, np.maximum(dv, 1e-3) / 2
-        left, right, top, bottom = u - half_u, u + half_u, v - half_v, v + half_v
-        covered = self._to(right, bottom) - self._to(left, bottom) - self._to(right, top) + self._to(left, top)
-        return np.asarray(np.clip(covered / (4 * half_u * half_v * CELLS_PER_MM**2), 0.0, 1.0))
+        planes = (np.ascontiguousarray(values, dtype=np.float64).ravel() for values in (u, v, du, dv))
+        return np.asarray(_mean_coverage(self.integral, *planes))
 
-    def _to(self, u: Floats, v: Floats) -> Floats:
-        """Covered area from the corner to (u, v), by bilinear interpolation [cells]."""
-        rows, columns = self.integral.shape
-        x = np.clip(np.asarray(u, dtype=np.float64) * CELLS_PER_MM, 0.0, columns - 1.0)
-        y = np.clip(np.asarray(v, dtype=np.float64) * CELLS_PER_MM, 0.0, rows - 1.0)
-        c, r = np.minimum(x.astype(np.intp), columns - 2), np.minimum(y.astype(np.intp), rows - 2)
-        a, b = x - c, y - r
-        upper = (1 - a) * self.integral[r, c] + a * self.integral[r, c + 1]
-        lower = (1 - a) * self.integral[r + 1, c] + a * self.integral[r + 1, c + 1]
-        return np.asarray((1 - b) * upper + b * lower)
+
+@njit(cache=True)
+def _covered(integral: Floats, u: float, v: float) -> float:
+    """Area from the corner to page point (u, v) [mm] that is covered, by bilinear interpolation [cells]."""
+    rows, columns = integral.shape
+    x, y = min(max(u * CELLS_PER_MM, 0.0), columns - 1.0), min(max(v * CELLS_PER_MM, 0.0), rows - 1.0)
+    c, r = min(int(x), columns - 2), min(int(y), rows - 2)
+    a, b = x - c, y - r
+    upper = (1 - a) * integral[r, c] + a * integral[r, c + 1]
+    return float((1 - b) * upper + b * ((1 - a) * integral[r + 1, c] + a * integral[r + 1, c + 1]))
+
+
+@njit(cache=True)
+def _mean_coverage(integral: Floats, u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
+    """Covered share of each footprint, (N,)."""
+    share = np.empty(len(u))
+    for i in range(len(u)):
+        a, b = max(du[i], 1e-3) / 2, max(dv[i], 1e-3) / 2
+        right = _covered(integral, u[i] + a, v[i] + b) - _covered(integral, u[i] + a, v[i] - b)
+        left = _covered(integral, u[i] - a, v[i] + b) - _covered(integral, u[i] - a, v[i] - b)
+        share[i] = min(max((right - left) / (4 * a * b * CELLS_PER_MM**2), 0.0), 1.0)
+    return share
 
 
 def set_words(

@@ -28,7 +28,7 @@ PENUMBRA_PX = 7
 # Notches narrower than this are pixels without depth, of the desk's own shade [px].
 NOTCH_PX = 17
 # A desk that gives back more than this share of the page's light is light: the page is no longer by far the brightest.
-LIGHT_SHARE = 0.25
+LIGHT_SHARE = 0.15
 # Border over the border of the convex hull: sides of crumpled pages run in and out by less.
 PERIMETER_MAX = 1.06
 
