@@ -5,6 +5,9 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
+from data_synth.lettering import glyph, pseudo_words
+from data_synth.lights import Format, Light, standard_lights
+from data_synth.manuscript import Layer, Lettered, Manuscript, hidden_manuscript
 from data_synth.pages import Blank, Checkerboard, Page, board_page
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
@@ -17,6 +20,11 @@ __all__ = [
     "Blank",
     "BoardPose",
     "Checkerboard",
+    "Format",
+    "Layer",
+    "Lettered",
+    "Light",
+    "Manuscript",
     "Page",
     "Rig",
     "RigConfig",
@@ -29,10 +37,14 @@ __all__ = [
     "default_rig",
     "dome",
     "flat_sheet",
+    "glyph",
+    "hidden_manuscript",
     "photograph",
     "plane",
     "posed",
+    "pseudo_words",
     "render",
     "render_board",
+    "standard_lights",
     "tent",
 ]

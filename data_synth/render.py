@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Sequence
 
-from data_synth.noise import deviations, expose, quantile_table
+import numpy as np
+
+from data_synth.lights import Light, under_lights
+from data_synth.noise import exposed
 from data_synth.optics import blurred, frame_window, margin_px, psf_taps
 from data_synth.pages import Page
 from data_synth.rig import Rig
@@ -19,7 +21,9 @@ from deskew.types import Capture, Floats, PatternKind
 _WHITE, _BLACK, _FIRST_LINE = 0, 1, 2
 
 
-def render(rig: Rig, sheet: TrueSheet, page: Page, seed: int | np.random.Generator) -> tuple[Capture, Truth]:
+def render(
+    rig: Rig, sheet: TrueSheet, page: Page, seed: int | np.random.Generator, *, lights: Sequence[Light] = ()
+) -> tuple[Capture, Truth]:
     """Photograph a sheet.
 
     White and black are rendered at once; the sweeps' frames one by one as they are read, so a caller who needs the
@@ -35,6 +39,8 @@ def render(rig: Rig, sheet: TrueSheet, page: Page, seed: int | np.random.Generat
         What is printed on it.
     seed : int or numpy Generator
         Of the sensor's noise; a generator gives one 63-bit draw.
+    lights : sequence of Light
+        Of the capture's textures, rendered at once.
 
     Returns
     -------
@@ -43,10 +49,12 @@ def render(rig: Rig, sheet: TrueSheet, page: Page, seed: int | np.random.Generat
     Truth
         True page coordinates and depth of every pixel, for metrics only.
     """
-    return photograph(rig, sheet, page, seed), true_sheet_seen(sheet, rig.camera)
+    return photograph(rig, sheet, page, seed, lights=lights), true_sheet_seen(sheet, rig.camera, lights)
 
 
-def photograph(rig: Rig, sheet: TrueSheet, page: Page, seed: int | np.random.Generator) -> Capture:
+def photograph(
+    rig: Rig, sheet: TrueSheet, page: Page, seed: int | np.random.Generator, *, lights: Sequence[Light] = ()
+) -> Capture:
     """Photograph a sheet without building its truth; parameters as in :func:`render`."""
     key = int(seed.integers(1 << 63)) if isinstance(seed, np.random.Generator) else seed
     require(0 <= key < 1 << 63, "seed", "be in [0, 2**63)", key)
@@ -62,12 +70,13 @@ def photograph(rig: Rig, sheet: TrueSheet, page: Page, seed: int | np.random.Gen
     white = black + blurred(light * window[0] * window[1], taps)
     width, height = rig.projector.size
     return Capture(
-        white=_exposed(rig, white, key, _WHITE),
-        black=_exposed(rig, black, key, _BLACK),
+        white=exposed(config.noise_variance, white, key, _WHITE),
+        black=exposed(config.noise_variance, black, key, _BLACK),
         projector_size=rig.projector.size,
         pattern=PatternKind.LINE_SWEEP,
         columns=Sweep(samples.column, light * window[1], black, width, config, key, _FIRST_LINE, upright=True),
         rows=Sweep(samples.row, light * window[0], black, height, config, key, _FIRST_LINE + width, upright=False),
+        textures=under_lights(rig, sheet, page, lights, key),
     )
 
 
@@ -76,11 +85,3 @@ def _windows(rig: Rig, samples: Samples) -> tuple[Floats, Floats]:
     blur = rig.config.projector_blur_sigma_px
     width, height = rig.projector.size
     return frame_window(samples.column, width, blur), frame_window(samples.row, height, blur)
-
-
-def _exposed(rig: Rig, mean: Floats, key: int, frame: int) -> npt.NDArray[np.uint8]:
-    """Turn a mean image into an 8-bit exposure."""
-    sigma = deviations(mean.ravel(), *rig.config.noise_variance)
-    image = np.empty(mean.shape, dtype=np.uint8)
-    expose(mean.ravel(), sigma, quantile_table(), key, frame, image.reshape(-1))
-    return image

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from data_synth.devices import packed, see_all
 from data_synth.geometry import Ints, buckets, gather, locate
+from data_synth.lights import Light
 from data_synth.sheets import TrueSheet
 from deskew.errors import require
 from deskew.types import Floats, Pinhole
@@ -28,11 +30,14 @@ class Truth:
         The true camera.
     screen : (h, w, 3) array
         The sheet's vertices in the camera: raw pixel x, y and depth [mm].
+    texture_maps : mapping of light name to (2, 3) array
+        Scan pixel (x, y, 1) to pixel of the light's image, for those of another format than the scan's.
     """
 
     sheet: TrueSheet
     camera: Pinhole
     screen: Floats
+    texture_maps: Mapping[str, Floats] = field(default_factory=dict)
 
     def page_at(self, raw_pixels: Floats) -> Floats:
         """Page coordinates seen by raw camera pixels.
@@ -82,9 +87,10 @@ class Truth:
         return _intersect(self.screen, values, raw_pixels, self.camera.size)
 
 
-def true_sheet_seen(sheet: TrueSheet, camera: Pinhole) -> Truth:
-    """Build the truth of a sheet under a camera."""
-    return Truth(sheet, camera, see_all(packed(camera), sheet.vertices))
+def true_sheet_seen(sheet: TrueSheet, camera: Pinhole, lights: Sequence[Light] = ()) -> Truth:
+    """Build the truth of a sheet under a camera, and of the formats that further images were taken in."""
+    maps = {light.name: light.readout.from_scan for light in lights if light.readout is not None}
+    return Truth(sheet, camera, see_all(packed(camera), sheet.vertices), maps)
 
 
 def _cells(page_size_mm: tuple[float, float]) -> tuple[int, int]:

@@ -38,7 +38,48 @@ CaptureFolder = Annotated[
 CalibrationFile = Annotated[Path, typer.Option("--calibration", "-c", help="calibration.json of the same devices.")]
 Shape = Annotated[tuple[int, int], typer.Option("--shape", metavar="R C", help="Mesh vertices down and across.")]
 Method = Annotated[str, typer.Option("--method", "-m", help="Flattening method.")]
+Lights = Annotated[
+    list[str] | None,
+    typer.Option("--light", "-l", metavar="NAME", help="Light to restore; may be repeated. White unless any is named."),
+]
+Combine = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--combine",
+        metavar="HOW",
+        help="mean, max, ratio:A/B or components of the named lights, or of all; may be repeated.",
+    ),
+]
+Scale = Annotated[float, typer.Option("--scale", metavar="S", help="Restored pixels for each of the camera's.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """Which pictures of a page are asked for; plain white if neither lights nor combinations are named."""
+
+    lights: tuple[str, ...] = ()
+    combine: tuple[str, ...] = ()
+    scale: float = 1.0
+
+    @classmethod
+    def of(cls, lights: Sequence[str] | None, combine: Sequence[str] | None, scale: float) -> _Wanted:
+        require(math.isfinite(scale) and 0 < scale <= 16, "--scale", "lie in (0, 16]", scale)
+        return cls(tuple(dict.fromkeys(lights or ())), tuple(dict.fromkeys(combine or ())), scale)
+
+    def combined(self, known: Sequence[str]) -> list[str]:
+        """Return the lights that combinations are made of, all in order."""
+        return list(self.lights or known)
+
+    def check(self, known: Sequence[str]) -> None:
+        """Refuse what these lights cannot give, before any long work."""
+        for light in self.lights:
+            require(light in known, "--light", f"be one of {', '.join(known)}", light)
+        if self.combine:
+            from deskew import restoration
+
+            for how in self.combine:
+                restoration.require_combination(how, self.combined(known))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +109,14 @@ def _open(folder: Path) -> Capture:
     return _watched(io.read_capture(folder), folder.name)
 
 
-def _scan(folder: Path, calibration: Calibration, shape: tuple[int, int]) -> Scan:
+def _scan(folder: Path, calibration: Calibration, shape: tuple[int, int], wanted: _Wanted | None = None) -> Scan:
     allowed = all(2 <= n <= 1000 for n in shape)
     require(allowed, "--shape", "be 2 to 1000 vertices down and across", f"{shape[0]} {shape[1]}")
     capture = _open(folder)  # before the import below: a wrong folder is then refused within the blink of an eye
+    if wanted is not None:
+        from deskew.types import WHITE
+
+        wanted.check([WHITE, *capture.textures])
     from deskew import pipeline
 
     return pipeline.scan(capture, calibration, shape=shape)
@@ -211,7 +256,7 @@ def _flat_page(folder: Path, devices: Calibration) -> tuple[DepthMap, Array]:
     capture = _open(folder)
     acquisition.require_same_devices(devices, capture)
     depth = acquisition.depth_map(devices, pipeline.decode(capture))
-    corners = acquisition.page_outline(capture.white, capture.black, devices.camera).corners
+    corners = acquisition.page_outline(capture.white, capture.black, devices.camera, depth=depth).corners
     inside = np.zeros(depth.z.shape, np.uint8)
     cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)  # a flat page's outline has four straight sides
     return depth, inside.astype(bool)
@@ -222,16 +267,24 @@ def restore(
     scan_file: Annotated[Path, typer.Argument(metavar="SCAN", help="scan.npz from `deskew scan`.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
     method: Method = "paper_euler",
+    lights: Lights = None,
+    combine: Combine = None,
+    scale: Scale = 1.0,
     as_json: Json = False,
 ) -> None:
-    """Flatten a scanned page and texture it: the restored image.
+    """Flatten a scanned page and texture it: the restored image, under any of its lights.
 
-    Example: deskew restore scan.npz -o restored.png
+    With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
+
+    Example: deskew restore scan.npz -o restored.png --light white --light uv --combine ratio:uv/white
     """
     from deskew import io
 
     io.require_writable(output, (".png", ".tif", ".tiff"))
-    _restore(io.read_scan(scan_file), method, output, as_json)
+    wanted = _Wanted.of(lights, combine, scale)
+    found = io.read_scan(scan_file)
+    wanted.check(list(found.images))
+    _restore(found, method, output, as_json, wanted)
 
 
 @app.command()
@@ -241,17 +294,23 @@ def run(
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
     method: Method = "paper_euler",
     shape: Shape = (45, 45),
+    lights: Lights = None,
+    combine: Combine = None,
+    scale: Scale = 1.0,
     as_json: Json = False,
 ) -> None:
-    """Take a capture folder to a restored page: scan, flatten, texture.
+    """Take a capture folder to a restored page: scan, flatten, texture, under any of its lights.
 
-    Example: deskew run page/ --calibration calibration.json -o restored.png
+    With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
+
+    Example: deskew run page/ --calibration calibration.json -o restored.png --light uv
     """
     from deskew import io
 
     io.require_writable(output, (".png", ".tif", ".tiff"))
     _require_method(method)
-    _restore(_scan(capture, io.read_calibration(calibration), shape), method, output, as_json)
+    wanted = _Wanted.of(lights, combine, scale)
+    _restore(_scan(capture, io.read_calibration(calibration), shape, wanted), method, output, as_json, wanted)
 
 
 def _require_method(method: str) -> None:
@@ -261,13 +320,37 @@ def _require_method(method: str) -> None:
     find_method(method)
 
 
-def _restore(found: Scan, method: str, output: Path, as_json: bool) -> None:
-    from deskew import io, pipeline
+def _restore(found: Scan, method: str, output: Path, as_json: bool, wanted: _Wanted) -> None:
+    import numpy as np
 
-    restoration = pipeline.restore(found, method=method)
-    figures = {"restored": str(output), "method": method, **_restored_figures(restoration)}
-    io.write_image(restoration.image, output)
+    from deskew import io, pipeline, restoration
+    from deskew.types import WHITE
+
+    known = list(found.images)
+    shown = wanted.lights or (() if wanted.combine else (WHITE,))
+    needed = wanted.combined(known) if wanted.combine else shown
+    restored = pipeline.restore_lights(found, method=method, lights=needed, scale=wanted.scale)
+    page = np.isfinite(restored.backward_map[..., 0])
+    pictures = {light: restored.images[light] for light in shown}
+    for how in wanted.combine:
+        pictures |= restoration.combined({light: restored.images[light] for light in needed}, page, how)
+    paths = _paths(output, list(pictures))
+    figures = {"restored": str(output), "method": method, **_restored_figures(restored.restoration(needed[0]))}
+    if len(paths) > 1:
+        figures["restored"] = [str(path) for path in paths.values()]
+    for light, fit in restored.registrations.items():
+        figures |= {f"{light}_scale": fit.scale.tolist(), f"{light}_offset_px": fit.offset.tolist()}
+        figures[f"{light}_residual_px"] = fit.residual_px
+    for name, path in paths.items():
+        io.write_image(pictures[name], path)
     _report(figures, as_json, output)
+
+
+def _paths(output: Path, names: Sequence[str]) -> dict[str, Path]:
+    """Name one picture as asked, several after what each shows."""
+    if len(names) == 1:
+        return {names[0]: output}
+    return {name: output.with_name(f"{output.stem}-{name}{output.suffix}") for name in names}
 
 
 def _say(message: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from deskew.acquisition import (
     SweepSettings,
 )
 from deskew.errors import StepError, require
+from deskew.restoration import Textures
 from deskew.types import (
     WHITE,
     Board,
@@ -24,6 +25,7 @@ from deskew.types import (
     Capture,
     Correspondence,
     DepthMap,
+    Flattened,
     PatternKind,
     Restoration,
     Scan,
@@ -145,13 +147,15 @@ def span(
 ) -> Scan:
     """Span a mesh over a page whose depth is known: the last step of :func:`scan`, which see for the parameters."""
     if outline is None:
-        outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask)
+        outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask, depth_map)
     mesh = acquisition.page_mesh(depth_map, outline, shape, max_hole_px=max_hole_px)
     images = {WHITE: capture.white, **capture.textures}
     return Scan(images, depth_map, calibration.camera, mesh.sheet, outline.corners)
 
 
-def restore(scan: Scan, *, method: str = "paper_euler", light: str = WHITE, **settings: object) -> Restoration:
+def restore(
+    scan: Scan, *, method: str = "paper_euler", light: str = WHITE, scale: float = 1.0, **settings: object
+) -> Restoration:
     """Flatten a scan and render the page as if it had never been bent (sections 3 and 3.5).
 
     Parameters
@@ -162,6 +166,8 @@ def restore(scan: Scan, *, method: str = "paper_euler", light: str = WHITE, **se
         A flattening method's name, or "package.module:function".
     light : str
         Which of the scan's images to restore.
+    scale : float
+        Pixels of the restored view for each of the camera's.
     **settings
         Of the flattening method.
 
@@ -171,7 +177,51 @@ def restore(scan: Scan, *, method: str = "paper_euler", light: str = WHITE, **se
         If the flattening diverged: there is nothing to texture.
     """
     require(light in scan.images, "light", f"be one of {', '.join(scan.images)}", light)
+    flattened = _flattened(scan, method, settings)
+    return restoration.restore_textures(scan, flattened, [light], scale).restoration(light)
+
+
+def restore_lights(
+    scan: Scan,
+    *,
+    method: str = "paper_euler",
+    lights: Iterable[str] | None = None,
+    scale: float = 1.0,
+    **settings: object,
+) -> Textures:
+    """Restore a page under several lights by one and the same flattening (section 2.4).
+
+    Parameters
+    ----------
+    scan : Scan
+        The page.
+    method : str
+        A flattening method's name, or "package.module:function".
+    lights : names, optional
+        Which of the scan's images to restore; all if not given.
+    scale : float
+        Pixels of the restored views for each of the camera's.
+    **settings
+        Of the flattening method.
+
+    Returns
+    -------
+    Textures
+        To add lights later, hand its `flattened` to :func:`deskew.restoration.restore_textures`.
+
+    Raises
+    ------
+    StepError
+        If the flattening diverged, or a light in another format does not fit the scan.
+    """
+    wanted = list(scan.images if lights is None else lights)
+    for light in wanted:
+        require(light in scan.images, "light", f"be one of {', '.join(scan.images)}", light)
+    return restoration.restore_textures(scan, _flattened(scan, method, settings), wanted, scale)
+
+
+def _flattened(scan: Scan, method: str, settings: Mapping[str, object]) -> Flattened:
     flattened = flattening.flatten(scan.sheet, method=method, **settings)
     if flattened.status is Status.DIVERGED:
         raise StepError(f"Flattening diverged: {flattened.remedy}")
-    return restoration.texture_quads(scan.images[light], scan.camera, scan.sheet, flattened)
+    return flattened

@@ -100,7 +100,7 @@ class PageSettings(Checked):
     """What is printed on the sheet."""
 
     group: ClassVar[str] = "page."
-    kind: str = choice("checkerboard", "checkerboard")
+    kind: str = choice("checkerboard", "checkerboard", "lettered")
 
 
 @dataclass

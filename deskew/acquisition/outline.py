@@ -11,9 +11,10 @@ from scipy import ndimage
 
 from deskew import projection
 from deskew.acquisition.grey import grey_levels
+from deskew.acquisition.lightdesk import is_light, light_desk_page
 from deskew.acquisition.pagemask import Mask, largest_filled, page_mask, require_page_shape
 from deskew.errors import StepError, require
-from deskew.types import Array, Floats, Pinhole
+from deskew.types import Array, DepthMap, Floats, Pinhole
 
 # Profiles across the boundary: reach and step [px], and the stretches that show pure desk and pure page.
 REACH_PX, STEP_PX = 6.0, 0.25
@@ -27,6 +28,10 @@ LEG_PX = 14.0
 TURN_MIN_DEG = 50.0
 # Blur rounds a corner off: boundary points this close to one are replaced by the corner itself.
 ROUNDED_PX = 3.0
+# Four sides enclose what the border does, but for the rounding of its corners.
+AREA_TOLERANCE = 0.02
+# On a light desk: step of the light that says where the border is, in grey levels; without one it stays as found.
+FAINT_STEP_GREY = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +80,9 @@ def straight_outline(corners: Floats) -> Outline:
     return Outline(top=np.stack([a, b]), right=np.stack([b, c]), bottom=np.stack([d, c]), left=np.stack([a, d]))
 
 
-def page_outline(white: Array, black: Array, camera: Pinhole, mask: Mask | None = None) -> Outline:
+def page_outline(
+    white: Array, black: Array, camera: Pinhole, mask: Mask | None = None, depth: DepthMap | None = None
+) -> Outline:
     """Find the page's sides and corners from the white and black frames, or from a mask drawn by hand.
 
     Each boundary point lies where the white frame passes half way from the desk's level to the page's own level just
@@ -89,6 +96,8 @@ def page_outline(white: Array, black: Array, camera: Pinhole, mask: Mask | None 
         The raw camera.
     mask : (height, width) bool array, optional
         True on the page, raw pixels; taken as it is, sides to .3 px and corners to 1, instead of what the frames show.
+    depth : DepthMap, optional
+        Of the same scene: on a desk nearly as light as the page, height above it tells them apart where light does not.
 
     Returns
     -------
@@ -104,18 +113,31 @@ def page_outline(white: Array, black: Array, camera: Pinhole, mask: Mask | None 
     width, height = camera.size
     require(white.shape[:2] == (height, width), "white", f"have the camera's shape {(height, width)}", white.shape)
     if mask is None:
-        page = page_mask(white, black)
+        faint = depth is not None and is_light(white, black)
+        page = light_desk_page(white, black, camera, depth) if depth is not None and faint else page_mask(white, black)
         signal = grey_levels(white).astype(np.float64)
     else:
         require(mask.shape == (height, width), "mask", f"have the camera's shape {(height, width)}", mask.shape)
         require(bool(mask.any()), "mask", "hold at least one pixel of the page", "an empty mask")
         page = largest_filled(mask)
         require_page_shape(page)
-        signal = cv2.GaussianBlur(page.astype(np.float64), (0, 0), 1.0)
-    ring = _boundary(signal, page)
+        signal, faint = cv2.GaussianBlur(page.astype(np.float64), (0, 0), 1.0), False
+    ring = _boundary(signal, page, faint)
     normalised = projection.undistort(camera, ring)
     ring = normalised @ camera.K[:2, :2].T + camera.K[:2, 2]
-    return _split_at_corners(ring)
+    outline = _split_at_corners(ring)
+    _require_same_area(outline, ring)
+    return outline
+
+
+def _require_same_area(outline: Outline, ring: Floats) -> None:
+    """Refuse corners that lines along a ragged border have thrown far off the border itself."""
+    found, seen = (cv2.contourArea(points.astype(np.float32).reshape(-1, 1, 2)) for points in (outline.ring, ring))
+    if abs(found - seen) > AREA_TOLERANCE * seen:
+        raise StepError(
+            f"Page outline: the sides enclose {found / seen:.0%} of the region found; "
+            "use a darker desk, unfold the page's corners, or give a mask."
+        )
 
 
 def _resample(ring: Floats, step: float) -> Floats:
@@ -126,7 +148,7 @@ def _resample(ring: Floats, step: float) -> Floats:
     return np.stack([np.interp(wanted, along, closed[:, k]) for k in range(2)], axis=-1)
 
 
-def _boundary(signal: Floats, page: Mask) -> Floats:
+def _boundary(signal: Floats, page: Mask, faint: bool) -> Floats:
     """Move the mask's contour along its normals to the half level; (n, 2) raw pixels, clockwise in the picture."""
     contours, _ = cv2.findContours(page.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     ring = _resample(max(contours, key=len).reshape(-1, 2).astype(np.float64), 1.0)
@@ -137,12 +159,15 @@ def _boundary(signal: Floats, page: Mask) -> Floats:
     tangent = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     outward = np.stack([tangent[:, 1], -tangent[:, 0]], axis=-1)
-    offset = _half_level_offset(signal, ring, outward)
+    offset = _half_level_offset(signal, ring, outward, faint)
     return np.asarray(ring + offset[:, None] * outward)
 
 
-def _half_level_offset(signal: Floats, ring: Floats, outward: Floats) -> Floats:
-    """Signed distance [px] along each outward normal to where the signal falls half way from page to desk."""
+def _half_level_offset(signal: Floats, ring: Floats, outward: Floats, faint: bool) -> Floats:
+    """Signed distance [px] along each outward normal to where the signal is half way from page to desk.
+
+    It falls there; on a light desk, where the border is `faint`, it may rise as well, or show nothing.
+    """
     t = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
     places = ring[:, None] + t[:, None] * outward[:, None]
     profile = ndimage.map_coordinates(signal, [places[..., 1], places[..., 0]], order=1, mode="nearest")
@@ -150,6 +175,10 @@ def _half_level_offset(signal: Floats, ring: Floats, outward: Floats) -> Floats:
     # The brighter part of the inner stretch: ink that comes close to the edge must not lower the page's level.
     inner = profile[:, (t >= PAGE_STRETCH_PX[0]) & (t <= PAGE_STRETCH_PX[1])]
     paper = np.percentile(inner, 75, axis=1)
+    if faint:
+        paper = np.median(inner, axis=1)
+        sign = np.where(paper >= desk, 1.0, -1.0)
+        profile, desk, paper = profile * sign[:, None], desk * sign, paper * sign
     above = profile >= ((desk + paper) / 2)[:, None]
     last = above.shape[1] - 1 - above[:, ::-1].argmax(axis=1)
     rows = np.arange(len(ring))
@@ -161,6 +190,9 @@ def _half_level_offset(signal: Floats, ring: Floats, outward: Floats) -> Floats:
     sound = above.any(axis=1) & (last < len(t) - 1) & (contrast > 0.2 * np.median(contrast))
     # A neighbour's shadow or a speck on the desk throws single points off: hold them to their surroundings.
     sound &= np.abs(offset - ndimage.median_filter(offset, 15, mode="wrap")) < 1.0
+    if faint:
+        kept = np.where(sound & (contrast > FAINT_STEP_GREY), offset, 0.0)
+        return np.asarray(ndimage.gaussian_filter1d(ndimage.median_filter(kept, 5, mode="wrap"), 1.5, mode="wrap"))
     if sound.mean() < 0.5:
         raise StepError(
             f"Page outline: {1 - sound.mean():.0%} of the boundary shows no clear step from page to desk; "

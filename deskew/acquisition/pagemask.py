@@ -76,13 +76,13 @@ def require_page_shape(mask: Mask) -> None:
     if touched:
         raise StepError(
             f"Page outline: the page touches the picture's {' and '.join(touched)} border; "
-            "move it or the camera until desk shows all round."
+            "move it or the camera until desk shows all round, or give a mask."
         )
     share = float(mask.mean())
     if share < AREA_MIN:
         raise StepError(
             f"Page outline: the largest light region covers {share:.2%} of the picture, {AREA_MIN:.0%} needed; "
-            "move the camera closer or use a darker desk."
+            "move the camera closer, use a darker desk, or give a mask."
         )
     contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     contour = max(contours, key=len).reshape(-1, 1, 2)
@@ -102,6 +102,22 @@ def largest_filled(mask: npt.NDArray[Any]) -> Mask:
     sizes = np.bincount(labels.ravel())
     sizes[0] = 0
     return np.asarray(ndimage.binary_fill_holes(labels == int(sizes.argmax())), dtype=bool)
+
+
+def one_page(mask: Mask) -> Mask:
+    """Return the one whole page that a mask of scattered finds shows: closed, filled, opened and checked.
+
+    Raises
+    ------
+    StepError
+        If it cannot be one whole page.
+    """
+    # A dark strip of margin beside ink may be broken by noise: close it, so that the ink becomes a hole and is filled.
+    # Only then may an opening drop the specks that hang on the page by single pixels.
+    whole = largest_filled(_morphology(mask, cv2.MORPH_CLOSE))
+    page = largest_filled(_morphology(whole, cv2.MORPH_OPEN))
+    require_page_shape(page)
+    return page
 
 
 def _morphology(mask: Mask, operation: int) -> npt.NDArray[np.uint8]:
@@ -144,9 +160,4 @@ def page_mask(white: Array, black: Array) -> Mask:
     # Ambient light tells page from desk only if the page clears the threshold well, not when its own grain sets it.
     if ambient_contrast > 2 * threshold:
         mask |= ambient
-    # A dark strip of margin beside ink may be broken by noise: close it, so that the ink becomes a hole and is filled.
-    # Only then may an opening drop the specks that hang on the page by single pixels.
-    whole = largest_filled(_morphology(mask, cv2.MORPH_CLOSE))
-    page = largest_filled(_morphology(whole, cv2.MORPH_OPEN))
-    require_page_shape(page)
-    return page
+    return one_page(mask)

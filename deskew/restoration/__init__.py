@@ -1,5 +1,35 @@
-"""From a flattened sheet back to a picture of the flat page (section 3.5)."""
+"""From a flattened sheet back to pictures of the flat page (section 3.5), under every light (section 2.4)."""
 
+from deskew.restoration.combine import (
+    Components,
+    as_picture,
+    combined,
+    maximum,
+    mean,
+    principal_components,
+    ratio,
+    require_combination,
+)
+from deskew.restoration.registration import Registration, register
+from deskew.restoration.textures import Textures, register_textures, restore_textures
 from deskew.restoration.warp import texture_quads, undistorted_view, undistortion_map, view_camera
 
-__all__ = ["texture_quads", "undistorted_view", "undistortion_map", "view_camera"]
+__all__ = [
+    "Components",
+    "Registration",
+    "Textures",
+    "as_picture",
+    "combined",
+    "maximum",
+    "mean",
+    "principal_components",
+    "ratio",
+    "register",
+    "register_textures",
+    "require_combination",
+    "restore_textures",
+    "texture_quads",
+    "undistorted_view",
+    "undistortion_map",
+    "view_camera",
+]

@@ -79,17 +79,36 @@ def sample_image(image: Array, pixels: npt.NDArray[np.float32], camera_size: Siz
     require(
         abs(h - factor * height) <= 1.0, "image", f"have the aspect of the camera's {width} x {height}", f"{w} x {h}"
     )
-    source = np.atleast_3d(image).astype(np.float64)
-    step = step_px * factor
-    if step > 1.0:
-        blurred = cv2.GaussianBlur(source, (0, 0), 0.5 * float(np.sqrt(step**2 - 1.0)))
-        source = blurred.reshape(source.shape)
-    places = pixels.reshape(-1, 2).astype(np.float64)
-    out = np.empty((len(places), source.shape[2]))
     # Pixel centres sit at integers, so a change of resolution is about the corner at (-1/2, -1/2).
-    xs, ys = (places[:, 0] + 0.5) * factor - 0.5, (places[:, 1] + 0.5) * (h / height) - 0.5
-    _sample(np.ascontiguousarray(source), np.ascontiguousarray(xs), np.ascontiguousarray(ys), out)
+    places = (pixels.astype(np.float64) + 0.5) * np.array([factor, h / height]) - 0.5
+    return read_at(image, places, step_px * factor)
+
+
+def read_at(image: Array, places: Floats, step_px: float) -> Array:
+    """Read an image at its own pixels.
+
+    Parameters
+    ----------
+    image : (h, w[, channels]) array
+        Integers or floats.
+    places : (..., 2) array
+        Pixels (x, y) of the image, NaN where there is nothing to read.
+    step_px : float
+        Distance of neighbouring places in the image's pixels; finer detail than that is smoothed away first.
+
+    Returns
+    -------
+    (...[, channels]) array
+        The image's dtype, rounded and clipped to its range if integer; 0 where `places` is NaN.
+    """
+    source = np.atleast_3d(image).astype(np.float64)
+    if step_px > 1.0:
+        blurred = cv2.GaussianBlur(source, (0, 0), 0.5 * float(np.sqrt(step_px**2 - 1.0)))
+        source = blurred.reshape(source.shape)
+    xs, ys = (np.ascontiguousarray(places[..., k].ravel(), dtype=np.float64) for k in range(2))
+    out = np.empty((len(xs), source.shape[2]))
+    _sample(np.ascontiguousarray(source), xs, ys, out)
     if image.dtype.kind in "ui":
         limits = np.iinfo(image.dtype)
         out = np.clip(np.rint(out), limits.min, limits.max)
-    return np.asarray(out.astype(image.dtype).reshape(pixels.shape[:2] + image.shape[2:]))
+    return np.asarray(out.astype(image.dtype).reshape(places.shape[:-1] + image.shape[2:]))

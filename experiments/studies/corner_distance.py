@@ -91,6 +91,7 @@ class CornerDistance(Study):
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial a sheet."""
         require_methods(config)
+        require(config.page.kind == "checkerboard", "page.kind", "be checkerboard, for its corners", config.page.kind)
         n = len(config.sheet.paths)
         require(n == 0 or config.trials <= n, "trials", f"be at most {n}, one a file of sheet.paths", config.trials)
         for path in config.sheet.paths[: config.trials]:

@@ -6,7 +6,7 @@ import importlib
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,6 +19,7 @@ import deskew
 from deskew import io
 from deskew.cli import main
 from deskew.errors import StepError
+from deskew.restoration import Textures
 from deskew.types import (
     Board,
     Calibration,
@@ -27,7 +28,6 @@ from deskew.types import (
     Flattened,
     PatternKind,
     Pinhole,
-    Restoration,
     Scan,
     Sheet,
     Status,
@@ -47,7 +47,8 @@ CALIBRATION = Calibration(
 def capture(seed: int = 0) -> Capture:
     rng = np.random.default_rng(seed)
     white, black, *planes = (rng.integers(0, 255, (8, 12), dtype=np.uint8) for _ in range(14))
-    return Capture(white, black, (6, 5), PatternKind.GRAY_CODE, planes[:6], planes[6:])
+    uv = {"uv": rng.integers(0, 255, (8, 12), dtype=np.uint8)}
+    return Capture(white, black, (6, 5), PatternKind.GRAY_CODE, planes[:6], planes[6:], uv)
 
 
 class StandIn:
@@ -76,15 +77,16 @@ class StandIn:
         depth = DepthMap(np.where(reason == 0, 9.0, np.nan), reason, CAMERA)
         x, y = np.meshgrid(np.linspace(-1, 1, shape[1]), np.linspace(1, -1, shape[0]))
         sheet = Sheet(np.stack([x, y, 0 * x], -1))
-        return Scan({"white": page.white}, depth, CAMERA, sheet, np.zeros((4, 2)))
+        return Scan({"white": page.white, **page.textures}, depth, CAMERA, sheet, np.zeros((4, 2)))
 
-    def restore(self, scan: Scan, *, method: str) -> Restoration:
-        self._step("restore", scan=scan, method=method)
+    def restore_lights(self, scan: Scan, *, method: str, lights: Sequence[str], scale: float) -> Textures:
+        self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale)
         remedy = "" if self.status is Status.AT_REST else "push harder"
         flattened = Flattened(
             scan.sheet.vertices, self.status, remedy, {"steps": 7, "spring_energy": np.float64("nan")}
         )
-        return Restoration(scan.images["white"][::-1].copy(), np.zeros((8, 12, 2), np.float32), CAMERA, flattened)
+        images = {light: scan.images[light][::-1].copy() for light in lights}
+        return Textures(images, np.zeros((8, 12, 2), np.float32), CAMERA, flattened, {})
 
 
 @pytest.fixture
@@ -163,6 +165,32 @@ def test_run_goes_from_a_folder_to_a_page(here: Path, steps: StandIn, capsys: py
     assert np.array_equal(io.read_image(here / "out" / "r.tif"), capture().white[::-1])
 
 
+@pytest.mark.parametrize("start", ["run page -c c.json", "restore scan.npz"])
+def test_every_light_and_combination_is_written_on_request(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], start: str
+) -> None:
+    uv = capture().textures["uv"][::-1]
+    assert run(f"{start} -o out/r.png --light uv --scale 2", capsys)[0] == 0
+    assert steps.calls["restore"]["lights"] == ["uv"]
+    assert steps.calls["restore"]["scale"] == 2.0
+    assert np.array_equal(io.read_image(here / "out" / "r.png"), uv)
+    (here / "out" / "r.png").unlink()
+    code, out, _ = run(f"{start} -o out/r.png -l uv -l white --combine mean --combine ratio:uv/white --json", capsys)
+    assert code == 0
+    names = ["r-uv.png", "r-white.png", "r-mean.png", "r-ratio-uv-white.png"]
+    assert json.loads(out)["restored"] == [f"out/{name}" for name in names]
+    assert sorted(path.name for path in (here / "out").iterdir()) == sorted(names)
+    assert np.array_equal(io.read_image(here / "out" / "r-uv.png"), uv)
+
+
+def test_combinations_alone_are_made_of_all_lights(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("restore scan.npz -o out/r.png --combine components", capsys)[0] == 0
+    assert steps.calls["restore"]["lights"] == ["white", "uv"]
+    assert sorted(path.name for path in (here / "out").iterdir()) == ["r-component-1.png", "r-component-2.png"]
+
+
 def test_accuracy_measures_the_page_and_not_the_desk(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -174,7 +202,7 @@ def test_accuracy_measures_the_page_and_not_the_desk(
     depth = DepthMap(z, np.zeros((8, 12), np.uint8), CAMERA)
     corners = np.array([[4.0, 1], [10, 1], [10, 6], [4, 6]])
     monkeypatch.setattr(acquisition, "depth_map", lambda devices, seen: depth)
-    monkeypatch.setattr(acquisition, "page_outline", lambda *images: SimpleNamespace(corners=corners))
+    monkeypatch.setattr(acquisition, "page_outline", lambda *images, depth: SimpleNamespace(corners=corners))
     code, out, err = run("accuracy page page -c c.json --json", capsys)
     assert (code, err) == (0, "")
     figures = json.loads(out)
@@ -255,6 +283,12 @@ WRONG_LINES = {
     "toml for calibration": ("scan page -c page/capture.toml -o out/s.npz", "must be valid JSON"),
     "image for scan": ("restore page/white.png -o out/r.png", "`page/white.png` must be a whole NPZ file"),
     "no such scan": ("restore gone.npz -o out/r.png", "`gone.npz` must be a file, got nothing there"),
+    "unknown light": ("run page -c c.json -o out/r.png --light ir", "`--light` must be one of white, uv, got ir"),
+    "unknown light of a scan": ("restore scan.npz -o out/r.png -l ir", "`--light` must be one of white, uv, got ir"),
+    "unknown combination": ("run page -c c.json -o out/r.png --combine sum", "`combine` must be one of mean, max"),
+    "ratio by no light": ("restore scan.npz -o out/r.png --combine ratio:uv/ir", "must name two of white, uv, got ir"),
+    "mean of one light": ("restore scan.npz -o out/r.png -l uv --combine mean", "must be of at least 2 lights"),
+    "scale 0": ("restore scan.npz -o out/r.png --scale 0", "`--scale` must lie in (0, 16], got 0.0"),
     "output a JPEG": ("run page -c c.json -o out/r.jpg", "`out/r.jpg` must end in .png or .tif or .tiff, got .jpg"),
     "output without suffix": ("calibrate board -o out/c", "`out/c` must end in .json, got no suffix"),
     "output in no folder": ("scan page -c c.json -o no/s.npz", "`no/s.npz` must lie in an existing folder"),
@@ -360,7 +394,8 @@ def test_the_module_ends_with_the_exit_code() -> None:
 def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
     program = (
         "import sys; from deskew import cli\n"
-        "cli._restore = lambda found, method, output, as_json: (output.touch(), cli._report({}, as_json, output))\n"
+        "def restore(found, method, output, as_json, wanted): output.touch(); cli._report({}, as_json, output)\n"
+        "cli._restore = restore\n"
         "sys.exit(cli.main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
     )
     with Path("/dev/full").open("w") as full:
