@@ -483,6 +483,8 @@ class Scan:
     outline : (4, 2) array
         The page's corners on the undistorted grid [px], in the grid's order: first row's first and last vertex, last
         row's last and first.
+    projector : ProjectorCheck
+        What the capture's frames say about the projector; a file does not keep it.
     """
 
     images: Mapping[str, Array]
@@ -490,6 +492,7 @@ class Scan:
     camera: Pinhole
     sheet: Sheet
     outline: Floats
+    projector: ProjectorCheck = ProjectorCheck()
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,4 +37,4 @@ def calibrated_bench(config: Config) -> Bench:
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
-    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, sweep=SweepSettings(mode=config.scan.mode)))
+    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, settings=SweepSettings(mode=config.scan.mode)))
