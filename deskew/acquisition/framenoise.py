@@ -41,6 +41,6 @@ def variance_line(deviations: Floats, brightness: Floats, median: float) -> Floa
 
 
 def noise_at(variances: Floats, brightness: Floats) -> Floats:
-    """Standard deviation of each pixel [grey levels] from what :func:`variance_line` found, never below rounding's."""
+    """Return each pixel's standard deviation [grey levels] from a :func:`variance_line`, never below rounding's."""
     levels = np.linspace(0.0, 1.0, len(variances)) * float(brightness.max())
     return np.asarray(np.sqrt(np.maximum(np.interp(brightness, levels, variances), ROUNDING_VARIANCE)))

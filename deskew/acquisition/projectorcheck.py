@@ -7,17 +7,17 @@ fringe are a sine. What is left over says what is wrong.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from math import exp, lgamma, log
 
 import numpy as np
 
 from deskew.types import Array, Floats, Fringe, ProjectorCheck
 
 STRAY_MAX = 0.02
-"""Share of a frame's light, root mean square, that may seem to come from another frame; a healthy rig stays below .01."""
+"""Share of a frame's light, root mean square, that may seem to come from another frame: twice a noisy healthy rig's."""
 
 GAMMA_RANGE = (0.95, 1.05)
-_WHITE_RANGE = (0.9, 1.1)  # of all lines together, over white minus black
 _FINE_PLANES = 3  # whose borders cover so much of the picture that a camera's own curve would look like stray light
 _WRONG = 0.5  # of white minus black: a pattern and its inverse that miss it by more are not each other's inverse
 _BRIGHT = 0.5  # of the 95th percentile of white minus black
@@ -41,7 +41,8 @@ def bright_pixels(lit: Floats) -> Array:
     return np.asarray(lit >= max(_BRIGHT * float(np.percentile(lit, 95)), 1.0))
 
 
-def _out_of_step(share: float, where: str) -> str:
+def out_of_step(share: float, where: str) -> str:
+    """Say that camera and projector are out of step by a share of the light, and what to do."""
     return (
         f"Projector and camera are out of step: {100 * share:.0f} % of the light in {where} comes from another frame; "
         f"{_STEP_REMEDY}."
@@ -86,104 +87,7 @@ def planes_check(stray: Floats, name: str) -> ProjectorCheck:
         return ProjectorCheck(stray=share)
     worst = int(np.argmax(np.maximum(stray[:, 0], stray[:, 1])))
     where = f"the Gray code of the {name}, worst in plane {worst}"
-    return ProjectorCheck((_out_of_step(share, where),), stray=share)
-
-
-@dataclass(slots=True)
-class SweepWatch:
-    """Keeps a sample of the pixels of every frame that passes.
-
-    Attributes
-    ----------
-    stride : int
-        Every so many-th pixel each way is kept.
-    """
-
-    stride: int
-    kept: list[Array] = field(default_factory=list)
-
-    @classmethod
-    def over(cls, lit: Floats, n_pixels: int = 20_000) -> SweepWatch:
-        """Watch some `n_pixels` of pictures like `lit`."""
-        return cls(max(1, round(float(np.sqrt(lit.size / n_pixels)))))
-
-    def passing(self, frame: Array) -> Array:
-        """Take the sample and hand the frame on."""
-        self.kept.append(frame[:: self.stride, :: self.stride].copy())
-        return frame
-
-    def check(self, lit: Floats, name: str) -> ProjectorCheck:
-        """Judge a whole sweep.
-
-        Parameters
-        ----------
-        lit : (height, width) array
-            White - black [grey levels].
-        name : str
-            What a fault calls the sweep.
-        """
-        lit = lit[:: self.stride, :: self.stride]
-        bright = bright_pixels(lit)
-        if bright.sum() < _FEWEST:
-            return ProjectorCheck()
-        place, total = _line_totals(np.stack([frame[bright] for frame in self.kept]), lit[bright])
-        if len(place) < _FEWEST:
-            return ProjectorCheck()
-        level = float(np.median(total))
-        faults = []
-        if not _WHITE_RANGE[0] <= level <= _WHITE_RANGE[1]:
-            faults.append(
-                f"All lines of the {name} together are {level:.2f} times as bright as the white frame: camera or "
-                "projector is not linear, or the exposure changed between them."
-            )
-        stray = _uneven(place, total / level)
-        if stray is not None and stray > STRAY_MAX:
-            faults.append(_out_of_step(stray, f"the sweep of the {name}"))
-        return ProjectorCheck(tuple(faults), stray=stray)
-
-
-_WINDOW = 6  # lines on either side of a pixel's own that hold all of its light, also from a doubled stripe
-
-
-def _line_totals(profiles: Array, lit: Floats) -> tuple[Floats, Floats]:
-    """Where each pixel's light peaks [lines], and all of its light over white - black, of profiles (lines, pixels)."""
-    n_lines = len(profiles)
-    peak = profiles.argmax(axis=0)
-    inside = (peak >= _WINDOW) & (peak < n_lines - _WINDOW)
-    if n_lines < 4 * _WINDOW or not inside.any():
-        return np.empty(0), np.empty(0)
-    profiles, peak, lit = profiles[:, inside], peak[inside], lit[inside]
-    lines = peak + np.arange(-_WINDOW, _WINDOW + 1)[:, None]
-    near = np.take_along_axis(profiles, lines, axis=0).astype(np.float64)
-    width = len(near)
-    dark = (profiles.sum(axis=0, dtype=np.float64) - near.sum(axis=0)) / (n_lines - width)
-    above = near - dark
-    light = above.sum(axis=0)
-    centre = (lines * above).sum(axis=0) / np.maximum(light, 1e-9)
-    good = light > 0.2 * lit
-    return centre[good], (light / lit)[good]
-
-
-def _uneven(place: Floats, total: Floats, fewest: int = 4) -> float | None:
-    """Root mean square change of the pixels' light from one line to the next, noise taken off; None if unknown.
-
-    A line shown twice or for longer makes its own pixels brighter and its neighbours' darker; shading and the white
-    frame's own noise know nothing of lines.
-    """
-    line = np.rint(place).astype(int)
-    line -= line.min()
-    count = np.bincount(line)
-    mean = np.bincount(line, total) / np.maximum(count, 1)
-    spread = np.bincount(line, (total - mean[line]) ** 2)
-    freedom = np.maximum(count - 1, 1)
-    used = count >= fewest
-    both = used[1:] & used[:-1]
-    if both.sum() < 50:
-        return None
-    # Each line's own spread: pixels that see two surfaces are few and lie together.
-    own = np.where(used, spread / freedom / np.maximum(count, 1), 0.0)
-    change = (np.diff(mean) ** 2 - own[1:] - own[:-1])[both]
-    return float(np.sqrt(max(float(change.mean()) / 2, 0.0)))
+    return ProjectorCheck((out_of_step(share, where),), stray=share)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +160,6 @@ def gamma_of(second: float, contrast: float) -> float:
     """
     gamma = 1.0
     for _ in range(20):
-        # First harmonic of light between 0 and 1, twice: 2 * 2 a_1 with a_1 = a_0 g / (g + 1), a_0 = (2g)! / (4^g g!^2).
         ratio = second / min(max(contrast / _first_harmonic(gamma), 0.05), 1.0) ** 3
         ratio = min(max(ratio, -0.3), 0.6)
         gamma = (1 + 2 * ratio) / (1 - ratio)
@@ -264,8 +167,7 @@ def gamma_of(second: float, contrast: float) -> float:
 
 
 def _first_harmonic(gamma: float) -> float:
-    from math import exp, lgamma, log
-
+    """Twice the first harmonic's amplitude of light in [0, 1]: a_1 = a_0 g / (g + 1), a_0 = (2 g)! / (4^g g!^2)."""
     mean = exp(lgamma(2 * gamma + 1) - 2 * lgamma(gamma + 1) - 2 * gamma * log(2.0))
     return 4 * mean * gamma / (gamma + 1)
 
@@ -282,7 +184,7 @@ def fringes_check(gamma: float, strays: Sequence[float], fringes: Sequence[Fring
     worst = int(np.argmax(strays))
     if strays[worst] > STRAY_MAX:
         where = f"the fringes of {fringes[worst].period_px:.4g} px of the {name}"
-        faults.append(_out_of_step(strays[worst], where))
+        faults.append(out_of_step(strays[worst], where))
     return ProjectorCheck(tuple(faults), gamma, float(strays[worst]))
 
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from deskew.acquisition.frames import read_frames
-from deskew.acquisition.projectorcheck import SweepWatch, join_checks
+from deskew.acquisition.projectorcheck import join_checks
 from deskew.acquisition.sweep import Scene, Sweep, SweepSettings, still_scene
 from deskew.acquisition.sweep_spatial import decode_spatial
 from deskew.acquisition.sweep_temporal import decode_temporal
+from deskew.acquisition.sweepcheck import SweepWatch
 from deskew.errors import StepError, require
 from deskew.types import Capture, Correspondence, Frames, PatternKind, ProjectorCheck, Reason
 
@@ -21,13 +22,14 @@ __all__ = ["SweepSettings", "decode_sweep"]
 def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) -> tuple[Sweep, ProjectorCheck]:
     n_frames = len(frames)
     require(n_frames >= settings.window, name, f"hold at least {settings.window} frames, one window", n_frames)
-    watch = SweepWatch.over(scene.contrast)
+    along_rows = name == "columns"
+    watch = SweepWatch(scene.contrast, columns=along_rows)
     grey = map(watch.passing, read_frames(frames, scene.white, name))
     if settings.mode == "temporal":
         sweep = decode_temporal(grey, n_frames, scene, settings)
     else:
-        sweep = decode_spatial(grey, n_frames, scene, settings, along_rows=name == "columns")
-    return sweep, watch.check(scene.contrast, name)
+        sweep = decode_spatial(grey, n_frames, scene, settings, along_rows=along_rows)
+    return sweep, watch.check(name)
 
 
 def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Correspondence:
