@@ -6,6 +6,7 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
 from data_synth.pages import Blank, Checkerboard, Page, board_page
+from data_synth.patterns import default_fringes
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
@@ -26,6 +27,7 @@ __all__ = [
     "board_page",
     "board_poses",
     "crumpled",
+    "default_fringes",
     "default_rig",
     "dome",
     "flat_sheet",
