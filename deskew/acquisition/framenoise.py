@@ -1,4 +1,4 @@
-"""Noise of a camera's frames by how bright they are: read noise plus shot noise, a straight line in the variance."""
+"""Noise of a camera's frames by how bright they are, from what is left over where frames have to agree."""
 
 from __future__ import annotations
 
@@ -9,11 +9,15 @@ from deskew.types import Floats
 ROUNDING_VARIANCE = 1.0 / 12.0
 """No camera is quieter than the rounding of its grey levels [grey levels^2]."""
 
-_LEVELS = 8
+_LEVELS = 12
+_FEWEST = 200  # pixels that make a median
 
 
-def variance_line(deviations: Floats, brightness: Floats, median: float) -> Floats:
-    """Fit the variance as a straight line in the brightness, robustly.
+def variance_by_level(deviations: Floats, brightness: Floats, median: float) -> Floats:
+    """Measure the variance at even steps of brightness, robustly.
+
+    Even steps and not even shares of the pixels: a little ink on a white page has a noise of its own, which nothing
+    that lies at the page's brightness can be extrapolated to.
 
     Parameters
     ----------
@@ -26,21 +30,24 @@ def variance_line(deviations: Floats, brightness: Floats, median: float) -> Floa
 
     Returns
     -------
-    (8,) array
-        Variance [grey levels^2] at even steps of brightness from 0 to its largest.
+    (13,) array
+        Variance [grey levels^2] at even steps of brightness from 0 to its largest, straight lines between those that
+        enough pixels have.
     """
-    edges = np.unique(np.quantile(brightness, np.linspace(0.0, 1.0, _LEVELS + 1)))
-    members = np.clip(np.searchsorted(edges, brightness, side="right") - 1, 0, max(len(edges) - 2, 0))
+    top = max(float(brightness.max()), 1e-9)
+    members = np.clip((brightness * (_LEVELS / top)).astype(int), 0, _LEVELS - 1)
     levels, variances = [], []
-    for i in range(max(len(edges) - 1, 1)):
+    for i in range(_LEVELS):
         chosen = members == i
-        levels.append(float(brightness[chosen].mean()))
-        variances.append(float(np.median(deviations[chosen])) / median)
-    line = np.polynomial.Polynomial.fit(levels, variances, 1 if len(levels) > 2 else 0)
-    return np.asarray(line(np.linspace(0.0, 1.0, _LEVELS) * float(brightness.max())))
+        if chosen.sum() >= _FEWEST:
+            levels.append(float(brightness[chosen].mean()))
+            variances.append(float(np.median(deviations[chosen])) / median)
+    if not levels:
+        levels, variances = [0.0], [float(np.median(deviations)) / median]
+    return np.interp(np.linspace(0.0, top, _LEVELS + 1), levels, variances)
 
 
 def noise_at(variances: Floats, brightness: Floats) -> Floats:
-    """Return each pixel's standard deviation [grey levels] from a :func:`variance_line`, never below rounding's."""
-    levels = np.linspace(0.0, 1.0, len(variances)) * float(brightness.max())
+    """Return each pixel's standard deviation [grey levels] from a :func:`variance_by_level`, not below rounding's."""
+    levels = np.linspace(0.0, max(float(brightness.max()), 1e-9), len(variances))
     return np.asarray(np.sqrt(np.maximum(np.interp(brightness, levels, variances), ROUNDING_VARIANCE)))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import fft
 from scipy.special import gammaincinv
 
-from deskew.acquisition.framenoise import noise_at, variance_line
+from deskew.acquisition.framenoise import noise_at, variance_by_level
 from deskew.acquisition.projectorcheck import FringeFit, bright_pixels, fit_overtones
 from deskew.types import Array, Floats, Fringe
 
@@ -29,8 +29,8 @@ class FringeImage:
         Projector coordinate within the period, in [0, period) [px].
     modulation : array
         Amplitude of the sine [grey levels].
-    place_sigma : array
-        Standard deviation of `place` that noise makes [px]: ``period / (2 pi) sqrt(2 / N) noise / modulation``.
+    noise : array
+        Standard deviation of one frame [grey levels].
     highest : array
         Brightest of the frames [grey levels].
     second, stray : float
@@ -40,18 +40,25 @@ class FringeImage:
     fringe: Fringe
     place: Floats
     modulation: Floats
-    place_sigma: Floats
+    noise: Floats
     highest: Floats
     second: float
     stray: float
 
     @property
-    def snr(self) -> Floats:
-        """Modulation over its own standard deviation."""
-        return np.asarray(self.fringe.period_px / (2 * np.pi) / self.place_sigma)
+    def modulation_sigma(self) -> Floats:
+        """Standard deviation of the modulation that noise makes [grey levels]."""
+        return np.asarray(np.sqrt(2 / self.fringe.n_steps) * self.noise)
+
+    @property
+    def place_sigma(self) -> Floats:
+        """Standard deviation of `place` that noise makes [px]: ``period / (2 pi) sqrt(2 / N) noise / modulation``."""
+        return np.asarray(
+            self.fringe.period_px / (2 * np.pi) * self.modulation_sigma / np.maximum(self.modulation, 1e-6)
+        )
 
 
-def read_fringe(frames: Iterator[Array], fringe: Fringe, lit: Floats) -> FringeImage:
+def read_fringe(frames: Iterator[Array], fringe: Fringe, judged: Floats) -> FringeImage:
     """Read the frames of one fringe and fit a sine to each pixel (least squares over N even steps: bin 1 of a DFT).
 
     Harmonic k of a projector or camera that is not linear biases the phase only if k + 1 or k - 1 is a multiple of N:
@@ -63,8 +70,8 @@ def read_fringe(frames: Iterator[Array], fringe: Fringe, lit: Floats) -> FringeI
         The next N are taken.
     fringe : Fringe
         Period and steps N.
-    lit : (height, width) array
-        White - black [grey levels].
+    judged : (height, width) array
+        White - black where it is not clipped, else 0 [grey levels]: overtones are fitted to the bright pixels.
     """
     n = fringe.n_steps
     steps = np.stack([frame.astype(np.float32) for frame in islice(frames, n)])
@@ -74,18 +81,16 @@ def read_fringe(frames: Iterator[Array], fringe: Fringe, lit: Floats) -> FringeI
     over = bins[2:] * (2 / n)
     if n % 2 == 0:
         over[-1] /= 2
-    fit = _overtones(over, first, lit, n)
+    fit = _overtones(over, first, judged, n)
     noise = _noise(over - fit.explained, mean, n)
-    modulation = np.abs(first)
     place = np.mod(-np.angle(first) * (fringe.period_px / (2 * np.pi)), fringe.period_px)
-    sigma = fringe.period_px / (2 * np.pi) * np.sqrt(2 / n) * noise / np.maximum(modulation, 1e-6)
-    return FringeImage(fringe, place, modulation, sigma, steps.max(axis=0), fit.second, fit.stray)
+    return FringeImage(fringe, place, np.abs(first), noise, steps.max(axis=0), fit.second, fit.stray)
 
 
-def _overtones(over: Array, first: Array, lit: Floats, n_steps: int) -> FringeFit:
+def _overtones(over: Array, first: Array, judged: Floats, n_steps: int) -> FringeFit:
     """Fit the overtones of all pixels by those that are bright, or as many of them as it takes."""
-    bright = np.flatnonzero(bright_pixels(lit))
-    chosen = np.zeros(lit.size, dtype=bool)
+    bright = np.flatnonzero(bright_pixels(judged))
+    chosen = np.zeros(judged.size, dtype=bool)
     chosen[bright[:: max(1, len(bright) // _FITTED)]] = True
     fit = fit_overtones(over.reshape(len(over), -1), first.ravel(), chosen, n_steps)
     return FringeFit(fit.explained.reshape(over.shape), fit.second, fit.stray)
@@ -98,4 +103,4 @@ def _noise(rest: Array, mean: Floats, n_steps: int) -> Floats:
         power[-1] *= 2
     freedom = n_steps - 3
     median = 2 * float(gammaincinv(freedom / 2, 0.5)) / freedom  # of chi-squared over its mean
-    return noise_at(variance_line(power.sum(axis=0) / freedom, mean, median), mean)
+    return noise_at(variance_by_level(power.sum(axis=0) / freedom, mean, median), mean)

@@ -14,10 +14,16 @@ import numpy as np
 from numba import njit
 from scipy import ndimage
 
-from deskew.acquisition.framenoise import noise_at, variance_line
+from deskew.acquisition.framenoise import noise_at, variance_by_level
 from deskew.acquisition.frames import read_frames
 from deskew.acquisition.grey import grey_levels
-from deskew.acquisition.projectorcheck import join_checks, pair_stray, planes_check
+from deskew.acquisition.projectorcheck import (
+    clipping_level,
+    join_checks,
+    light_to_judge,
+    pair_stray,
+    planes_check,
+)
 from deskew.errors import require, require_positive, require_whole
 from deskew.types import Array, Capture, Correspondence, Floats, PatternKind, Reason
 
@@ -90,8 +96,9 @@ def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> C
     settings = settings or GrayCodeSettings()
     still = grey_levels(capture.white, "white")
     white, black = (image.astype(np.float64) for image in (still, grey_levels(capture.black, "black")))
-    columns = read_planes(read_frames(capture.columns, still, "columns"), white, black)
-    rows = read_planes(read_frames(capture.rows, still, "rows"), white, black)
+    judged = light_to_judge(white, black, clipping_level(still))
+    columns = read_planes(read_frames(capture.columns, still, "columns"), white, black, judged)
+    rows = read_planes(read_frames(capture.rows, still, "rows"), white, black, judged)
     noise = columns.noise
     shadow = white - black < settings.shadow_snr * noise
     # A border between rows runs along the image's x: transpose, so that both sweeps are read along the last axis.
@@ -133,7 +140,7 @@ class Planes:
     stray: Floats
 
 
-def read_planes(planes: Iterator[Array], white: Floats, black: Floats) -> Planes:
+def read_planes(planes: Iterator[Array], white: Floats, black: Floats, judged: Floats) -> Planes:
     """Read bit planes, each followed by its inverse.
 
     Light adds up: pattern + inverse - (white + black) is noise alone, of four frames, where camera and projector are in
@@ -145,15 +152,17 @@ def read_planes(planes: Iterator[Array], white: Floats, black: Floats) -> Planes
         Read to its end.
     white, black : (height, width) arrays
         Grey levels.
+    judged : (height, width) array
+        White - black where it is not clipped, else 0 [grey levels].
     """
-    both, lit = white + black, white - black
+    both = white + black
     differences, lines, stray = [], [], []
     for pattern, inverse in zip(planes, planes, strict=True):
         light, dark = pattern.astype(np.float32), inverse.astype(np.float32)
         differences.append(light - dark)
         residual = light + dark - both
-        lines.append(variance_line(residual**2, both, 4.0 * _SQUARED_MEDIAN))
-        stray.append(pair_stray(residual, lit))
+        lines.append(variance_by_level(residual**2, both, 4.0 * _SQUARED_MEDIAN))
+        stray.append(pair_stray(residual, judged))
     return Planes(np.stack(differences), noise_at(np.median(lines, axis=0), both), np.array(stray))
 
 

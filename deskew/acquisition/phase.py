@@ -21,7 +21,16 @@ from deskew.acquisition.frames import read_frames
 from deskew.acquisition.fringes import FringeImage, read_fringe
 from deskew.acquisition.graycode import gray_to_index, read_planes
 from deskew.acquisition.grey import grey_levels
-from deskew.acquisition.projectorcheck import bright_pixels, fringes_check, gamma_of, join_checks, planes_check
+from deskew.acquisition.projectorcheck import (
+    FEWEST_PIXELS,
+    bright_pixels,
+    clipping_level,
+    fringes_check,
+    gamma_of,
+    join_checks,
+    light_to_judge,
+    planes_check,
+)
 from deskew.errors import require, require_positive, require_whole
 from deskew.types import (
     Array,
@@ -126,47 +135,49 @@ def decode_phase(capture: Capture, settings: PhaseSettings | None = None) -> Cor
 def _decode_axis(frames: Frames, name: str, extent: int, capture: Capture, settings: PhaseSettings) -> _Axis:
     still = grey_levels(capture.white, "white")
     white, black = (image.astype(np.float64) for image in (still, grey_levels(capture.black, "black")))
-    lit = white - black
-    top = settings.saturated_level or (int(np.iinfo(still.dtype).max) if still.dtype.kind == "u" else np.inf)
+    top = settings.saturated_level or clipping_level(still)
+    judged = light_to_judge(white, black, top)
     grey = read_frames(frames, still, name)
     check = ProjectorCheck()
     coded: tuple[Floats, Bools] | None = None
     if capture.pattern is PatternKind.GRAY_PHASE:
         fringe = capture.fringes[0]
-        planes = read_planes(islice(grey, n_planes(half_periods(fringe, extent))), white, black)
+        planes = read_planes(islice(grey, n_planes(half_periods(fringe, extent))), white, black, judged)
         check = planes_check(planes.stray, name)
         faint = np.abs(planes.differences) < settings.bit_snr * np.sqrt(2) * planes.noise
         coded = gray_to_index(planes.differences > 0), faint
-    images = [read_fringe(grey, fringe, lit) for fringe in capture.fringes]
-    if next(grey, None) is not None:  # pragma: no cover - read_frames has refused it
-        raise AssertionError
+    images = [read_fringe(grey, fringe, judged) for fringe in capture.fringes]
+    for _ in grey:  # one frame too many is refused by the reader
+        pass
     if coded is not None:
         coordinate, reason = unwrap_by_code(images[0], *coded)
     else:
         coordinate, reason = unwrap_by_periods(images, extent, settings.unwrap_snr)
-    _judge(images, lit, top, settings, reason)
+    _judge(images, white - black, judged, top, settings, reason)
     outside = (coordinate < -0.5) | (coordinate > extent - 0.5)
     reason[outside & (reason == Reason.OK)] = Reason.WEAK
-    return _Axis(coordinate, reason, join_checks(check, _check(images, lit, name)))
+    return _Axis(coordinate, reason, join_checks(check, _check(images, judged, name)))
 
 
 def _judge(
-    images: list[FringeImage], lit: Floats, top: float, settings: PhaseSettings, reason: npt.NDArray[np.uint8]
+    images: list[FringeImage],
+    lit: Floats,
+    judged: Floats,
+    top: float,
+    settings: PhaseSettings,
+    reason: npt.NDArray[np.uint8],
 ) -> None:
     """Say of each pixel, in place, why it has no coordinate: the later of these overrules the earlier."""
+    promised, bright = np.maximum(lit, 1e-9) / 2, bright_pixels(judged)
     for image in images:
-        promised = np.maximum(lit, 1e-9) / 2
-        noise = image.modulation / image.snr
-        share = image.modulation / promised
-        typical = float(np.median(share[bright_pixels(lit)]))
-        two = image.modulation + 3 * noise < settings.contrast_ratio * typical * promised
+        typical = float(np.median((image.modulation / promised)[bright])) if bright.any() else 0.0
+        two = image.modulation + 3 * image.modulation_sigma < settings.contrast_ratio * typical * promised
         reason[two & (reason == Reason.OK)] = Reason.TWO_PEAKS
     for image in images:
-        reason[image.snr < settings.min_snr] = Reason.WEAK
+        reason[image.modulation < settings.min_snr * image.modulation_sigma] = Reason.WEAK
     for image in images:
         reason[image.highest >= top] = Reason.SATURATED
-        frame_noise = image.modulation / image.snr / np.sqrt(2 / image.fringe.n_steps)
-        reason[lit < settings.shadow_snr * frame_noise] = Reason.SHADOW
+        reason[lit < settings.shadow_snr * image.noise] = Reason.SHADOW
 
 
 def unwrap_by_code(image: FringeImage, index: Array, faint: Bools) -> tuple[Floats, npt.NDArray[np.uint8]]:
@@ -239,10 +250,12 @@ def unwrap_by_periods(
     return coordinate, reason
 
 
-def _check(images: list[FringeImage], lit: Floats, name: str) -> ProjectorCheck:
+def _check(images: list[FringeImage], judged: Floats, name: str) -> ProjectorCheck:
     """Judge the projector by the shortest fringe's harmonics and by every fringe's stray light."""
-    bright = bright_pixels(lit)
+    bright = bright_pixels(judged)
+    if bright.sum() < FEWEST_PIXELS:
+        return ProjectorCheck()
     finest = images[-1]
-    contrast = float(np.median(2 * finest.modulation[bright] / np.maximum(lit[bright], 1e-9)))
+    contrast = float(np.median(2 * finest.modulation[bright] / judged[bright]))
     gamma = gamma_of(finest.second, contrast)
     return fringes_check(gamma, [image.stray for image in images], [image.fringe for image in images], name)

@@ -17,11 +17,13 @@ from deskew.types import Array, Floats, Fringe, ProjectorCheck
 STRAY_MAX = 0.02
 """Share of a frame's light, root mean square, that may seem to come from another frame: twice a noisy healthy rig's."""
 
+FEWEST_PIXELS = 1000
+"""Bright pixels that make a judgement."""
+
 GAMMA_RANGE = (0.95, 1.05)
 _FINE_PLANES = 3  # whose borders cover so much of the picture that a camera's own curve would look like stray light
 _WRONG = 0.5  # of white minus black: a pattern and its inverse that miss it by more are not each other's inverse
 _BRIGHT = 0.5  # of the 95th percentile of white minus black
-_FEWEST = 1000  # bright pixels that make a judgement
 _STEP_REMEDY = "trigger the camera by the projector, or wait longer after every pattern"
 
 
@@ -36,8 +38,18 @@ def join_checks(*checks: ProjectorCheck) -> ProjectorCheck:
     )
 
 
+def light_to_judge(white: Floats, black: Floats, clipped_at: float) -> Floats:
+    """White - black [grey levels], 0 where the white frame is clipped: such pixels say nothing of the projector."""
+    return np.where(white >= clipped_at, 0.0, np.asarray(white, dtype=np.float64) - black)
+
+
+def clipping_level(image: Array) -> float:
+    """Largest grey level that the image's type holds; infinite for floats."""
+    return float(np.iinfo(image.dtype).max) if image.dtype.kind == "u" else np.inf
+
+
 def bright_pixels(lit: Floats) -> Array:
-    """Mask (height, width) of the pixels bright enough to judge a projector by, from white - black."""
+    """Mask (height, width) of the pixels bright enough to judge a projector by, from :func:`light_to_judge`."""
     return np.asarray(lit >= max(_BRIGHT * float(np.percentile(lit, 95)), 1.0))
 
 
@@ -57,7 +69,7 @@ def pair_stray(residual: Floats, lit: Floats) -> tuple[float, float]:
     residual : (height, width) array
         Pattern + inverse - white - black [grey levels].
     lit : (height, width) array
-        White - black [grey levels].
+        From :func:`light_to_judge` [grey levels].
 
     Returns
     -------
@@ -66,7 +78,7 @@ def pair_stray(residual: Floats, lit: Floats) -> tuple[float, float]:
         miss white altogether. NaN if hardly any pixel is bright.
     """
     bright = bright_pixels(lit)
-    if bright.sum() < _FEWEST:
+    if bright.sum() < FEWEST_PIXELS:
         return np.nan, np.nan
     relative = residual / np.where(bright, lit, np.inf)
     # What the planes' wide stripes add is the same in neighbouring pixels; noise is not.
@@ -130,6 +142,8 @@ def fit_overtones(bins: Array, first: Array, chosen: Array, n_steps: int) -> Fri
     unit = first / size
     explained = np.zeros_like(bins)
     second, strange = 0.0, 0.0
+    if not chosen.any():
+        return FringeFit(explained, second, strange)
     for i, k in enumerate(range(2, n_steps // 2 + 1)):
         overtones = np.stack([size * unit**k, size * np.conj(unit) ** (n_steps - k)], axis=-1)
         others = np.stack([first, np.conj(first), size.astype(first.dtype)], axis=-1)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from deskew.acquisition.frames import read_frames
-from deskew.acquisition.projectorcheck import join_checks
+from deskew.acquisition.projectorcheck import join_checks, light_to_judge
 from deskew.acquisition.sweep import Scene, Sweep, SweepSettings, still_scene
 from deskew.acquisition.sweep_spatial import decode_spatial
 from deskew.acquisition.sweep_temporal import decode_temporal
@@ -23,7 +23,8 @@ def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) ->
     n_frames = len(frames)
     require(n_frames >= settings.window, name, f"hold at least {settings.window} frames, one window", n_frames)
     along_rows = name == "columns"
-    watch = SweepWatch(scene.contrast, columns=along_rows)
+    judged = light_to_judge(scene.white, scene.black, scene.saturated_level)
+    watch = SweepWatch(judged, columns=along_rows)
     grey = map(watch.passing, read_frames(frames, scene.white, name))
     if settings.mode == "temporal":
         sweep = decode_temporal(grey, n_frames, scene, settings)

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from deskew.acquisition.projectorcheck import STRAY_MAX, bright_pixels, out_of_step
+from deskew.acquisition.projectorcheck import FEWEST_PIXELS, STRAY_MAX, bright_pixels, out_of_step
 from deskew.types import Array, Floats, ProjectorCheck
 
 _WHITE_RANGE = (0.9, 1.1)  # of all lines together, over white minus black
-_FEWEST_PIXELS = 1000  # bright ones, that make a judgement
 _FEWEST_LINES = 50
 _FEWEST_ON_LINE = 8
 _SAMPLE = 40_000  # pixels
@@ -31,7 +30,7 @@ class SweepWatch:
     Parameters
     ----------
     lit : (height, width) array
-        White - black [grey levels].
+        White - black where it can be judged [grey levels].
     columns : bool
         Whether the projector's columns are swept, else its rows: pixels are taken in whole lines across those.
     """
@@ -71,13 +70,13 @@ class SweepWatch:
     def check(self, name: str) -> ProjectorCheck:
         """Judge the whole sweep; a fault calls it by `name`."""
         n_others = self._n_frames - len(self._near)
-        if len(self._where) < _FEWEST_PIXELS or n_others < len(self._near):
+        if len(self._where) < FEWEST_PIXELS or n_others < len(self._near):
             return ProjectorCheck()
         # What lies far from the peak is the pixel's dark level.
         above = self._near - (self._total - self._near.sum(axis=0)) / n_others
         light = above.sum(axis=0)
         good = light > _SEEN * self._lit
-        if good.sum() < _FEWEST_PIXELS:
+        if good.sum() < FEWEST_PIXELS:
             return ProjectorCheck()
         above, light = above[:, good], light[good]
         offset = np.arange(-_WINDOW, _WINDOW + 1)[:, None]
