@@ -50,7 +50,10 @@ ROOT = Path(__file__).resolve().parents[2]
         ("engine=ray", ("`engine`", "processes, serial", "'ray'")),
         ("engine=slurm", ("`engine`", "processes, serial", "'slurm'")),
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
-        ("experiment=stiffness", ("`experiment`", "corner_distance, decoders, fake, plane_accuracy, real_boards", "'stiffness'")),
+        (
+            "experiment=stiffness",
+            ("`experiment`", "corner_distance, decoders, fake, plane_accuracy, real_boards", "'stiffness'"),
+        ),
         ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
         ("trials", ("`trials`", "KEY=VALUE")),
         ("--nonsense", ("--nonsense", "KEY=VALUE")),
