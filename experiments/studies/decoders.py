@@ -51,8 +51,9 @@ class Decoders(Study):
     """The same crumpled sheet under every pattern; a trial is one sheet.
 
     A Gray code repeats its frames and averages them. Fringes take more steps, and are exposed repeatedly from 128
-    frames an axis on; white and black are then averaged as well, which also helps the correction of ink. A line sweep can neither be cut nor spread: it takes one frame a projector line, 1792 of the
-    default rig, and stands beside the others at their largest number of frames only.
+    frames an axis on; white and black are then averaged as well, which also helps the correction of ink. A line sweep
+    can neither be cut nor spread: it takes one frame a projector line, 1792 of the default rig, and stands beside the
+    others at their largest number of frames only.
 
     Conditions
     ----------

@@ -5,7 +5,6 @@ import pytest
 
 import data_synth
 from deskew import acquisition, metrics, pipeline, restoration
-from deskew.io import read_capture, write_capture
 from deskew.types import Calibration, PatternKind
 
 SEED = 6201  # of no study and no development run
@@ -49,13 +48,3 @@ def test_forty_frames_measure_an_inked_page_and_the_correction_of_ink_holds_for_
     assert corrected["depth_raw_rms_mm"] < 0.65 * plain["depth_raw_rms_mm"]
     assert corrected["depth_coverage"] > coverage
     assert corrected["depth_raw_max_mm"] < 2.0  # half a period off would be 8 mm
-
-
-def test_fringes_survive_a_folder(rig, sheet, tmp_path):
-    capture = data_synth.photograph(rig, sheet, data_synth.Blank(), SEED, PatternKind.GRAY_PHASE)
-    write_capture(capture, tmp_path / "page")
-    stored = read_capture(tmp_path / "page")
-    assert stored.fringes == capture.fringes
-    ours, theirs = pipeline.decode(capture), pipeline.decode(stored)
-    np.testing.assert_array_equal(ours.column, theirs.column)
-    assert ours.projector == theirs.projector
