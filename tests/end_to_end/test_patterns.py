@@ -35,7 +35,6 @@ def depth_figures(rig, sheet, page, pattern):
 @pytest.mark.parametrize(
     ("pattern", "most_mm", "coverage"),
     [
-        (PatternKind.GRAY_CODE, 0.09, 0.985),
         (PatternKind.GRAY_PHASE, 0.11, 0.995),
         (PatternKind.MULTI_PHASE, 0.10, 0.995),
     ],
