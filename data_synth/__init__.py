@@ -9,6 +9,7 @@ from data_synth.lettering import glyph, pseudo_words
 from data_synth.lights import Format, Light, standard_lights
 from data_synth.manuscript import Layer, Lettered, Manuscript, hidden_manuscript
 from data_synth.pages import Blank, Checkerboard, Page, board_page
+from data_synth.patterns import default_fringes
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
@@ -34,6 +35,7 @@ __all__ = [
     "board_page",
     "board_poses",
     "crumpled",
+    "default_fringes",
     "default_rig",
     "dome",
     "flat_sheet",

@@ -11,7 +11,7 @@ from data_synth.render import photograph
 from data_synth.rig import Rig
 from data_synth.sheets import posed
 from deskew.errors import require
-from deskew.types import Board, Capture, Floats
+from deskew.types import Board, Capture, Floats, PatternKind
 
 BOARD = Board(shape=(11, 8), square=18.0)
 """The board: 12 x 9 squares of 18 mm inside a white margin; small enough to be tilted in view from all sides."""
@@ -76,8 +76,14 @@ def _pose(lowest: float, tilt_deg: float, azimuth_deg: float, turn_deg: float, x
     return BoardPose(R, np.array([x, y, lowest - (corners @ R.T)[:, 2].min()]))
 
 
-def render_board(rig: Rig, pose: BoardPose, seed: int | np.random.Generator, board: Board = BOARD) -> Capture:
-    """Photograph the board in a pose: white, black and both lazy sweeps.
+def render_board(
+    rig: Rig,
+    pose: BoardPose,
+    seed: int | np.random.Generator,
+    board: Board = BOARD,
+    pattern: PatternKind = PatternKind.LINE_SWEEP,
+) -> Capture:
+    """Photograph the board in a pose: white, black and lazy coded frames.
 
     Parameters
     ----------
@@ -89,6 +95,8 @@ def render_board(rig: Rig, pose: BoardPose, seed: int | np.random.Generator, boa
         Of the sensor's noise.
     board : Board
         Corners and squares [mm].
+    pattern : PatternKind
+        What the projector shows.
     """
     page = board_page(board, MARGIN_MM)
-    return photograph(rig, posed(page.page_size_mm, pose.R, pose.t), page, seed)
+    return photograph(rig, posed(page.page_size_mm, pose.R, pose.t), page, seed, pattern)

@@ -26,7 +26,7 @@ from data_synth.sheets import PAGE_SIZE_MM, flat_sheet
 from deskew.errors import DeskewError, require
 from deskew.io import write_board, write_capture
 from deskew.io.files import replacing_folder
-from deskew.types import Capture
+from deskew.types import Capture, PatternKind
 
 MAX_PAGES = 100
 
@@ -35,11 +35,19 @@ _T = TypeVar("_T")
 
 
 def write_example(
-    rig: Rig, folder: Path, *, seed: int = 0, n_pages: int = 1, n_poses: int = 9, slope_p90_deg: float = 20.0
+    rig: Rig,
+    folder: Path,
+    *,
+    seed: int = 0,
+    n_pages: int = 1,
+    n_poses: int = 9,
+    slope_p90_deg: float = 20.0,
+    pattern: PatternKind = PatternKind.LINE_SWEEP,
 ) -> None:
     """Write ``board/`` (a calibration folder), ``flat/`` (a blank flat page) and ``page_00/``, ... (crumpled checkers).
 
-    Frames are rendered and written one at a time; a folder of the default rig takes 180 MB. All appear or none.
+    Frames are rendered and written one at a time; a line sweep of the default rig takes 180 MB, the other
+    patterns some 10. All appear or none.
 
     Parameters
     ----------
@@ -55,6 +63,8 @@ def write_example(
         Poses of the board, as :func:`board_poses` allows.
     slope_p90_deg : float
         Severity, as :func:`crumpled` allows.
+    pattern : PatternKind
+        What the projector shows.
 
     Raises
     ------
@@ -72,15 +82,15 @@ def write_example(
 
     def boards() -> Iterator[Capture]:
         for i, pose in enumerate(_watched(poses, "board")):
-            yield render_board(rig, pose, draw(_BOARDS, i))
+            yield render_board(rig, pose, draw(_BOARDS, i), pattern=pattern)
 
     with replacing_folder(folder) as new:
         # The pages first: a severity that cannot be drawn is then known before the minutes that the board takes.
         for i in _watched(range(n_pages), "pages"):
             rng = draw(_PAGES, i)
             sheet = crumpled(rng, PAGE_SIZE_MM, slope_p90_deg)
-            write_capture(photograph(rig, sheet, Checkerboard(), rng), new / f"page_{i:02d}")
-        write_capture(photograph(rig, flat_sheet(), Blank(), draw(_FLAT, 0)), new / "flat")
+            write_capture(photograph(rig, sheet, Checkerboard(), rng, pattern), new / f"page_{i:02d}")
+        write_capture(photograph(rig, flat_sheet(), Blank(), draw(_FLAT, 0), pattern), new / "flat")
         write_board(BOARD, boards(), new / "board")
 
 
@@ -100,7 +110,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run ``python -m data_synth.captures`` and return its exit code: 0 done, 2 wrong input, 3 a step failed."""
     parser = _Parser(
         prog="data_synth.captures",
-        description="Render a calibration folder and capture folders (line sweep; 180 MB and 20 s each).",
+        description="Render a calibration folder and capture folders (a line sweep: 180 MB and 20 s each).",
         epilog="Example: python -m data_synth.captures example/ --poses 8 --pages 2",
         allow_abbrev=False,
     )
@@ -109,6 +119,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--pages", type=int, default=1, help="crumpled pages [%(default)s]")
     parser.add_argument("--poses", type=int, default=9, help="poses of the printed board [%(default)s]")
     parser.add_argument("--slope-p90-deg", type=float, default=20.0, help="how crumpled: 1 to 35 [%(default)s]")
+    parser.add_argument(
+        "--pattern",
+        choices=[str(kind) for kind in PatternKind],
+        default=str(PatternKind.LINE_SWEEP),
+        help="what the projector shows [%(default)s]",
+    )
     chosen = parser.parse_args(argv)
     try:
         write_example(
@@ -118,6 +134,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             n_pages=chosen.pages,
             n_poses=chosen.poses,
             slope_p90_deg=chosen.slope_p90_deg,
+            pattern=PatternKind(chosen.pattern),
         )
     except DeskewError as error:
         print(f"{parser.prog}: {error}", file=sys.stderr)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from data_synth.exposure import exposed
 from data_synth.manuscript import Layer, Manuscript
-from data_synth.noise import exposed
 from data_synth.optics import blurred, margin_px, psf_taps
 from data_synth.pages import Page
 from data_synth.rig import Rig, look_at
@@ -150,6 +150,4 @@ def _under(rig: Rig, sheet: TrueSheet, page: Page, light: Light, key: int, frame
     sigma = config.camera_psf_sigma_px
     samples = sample_scene(Rig(camera, light.lamp, config), sheet, page, margin_px(sigma))
     radiance = np.float32(light.direct) * samples.lit + np.float32(light.even) * samples.sky
-    return exposed(
-        config.noise_variance, blurred(radiance, psf_taps(sigma)) + np.float32(config.pedestal_grey), key, frame
-    )
+    return exposed(blurred(radiance, psf_taps(sigma)) + np.float32(config.pedestal_grey), config, key, frame)

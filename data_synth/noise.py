@@ -88,11 +88,3 @@ def expose(mean: Floats, sigma: Floats, table: Floats, key: int, frame: int, ima
         start, first = run_start(key, frame, run), run * RUN
         for k in range(min(RUN, n - first)):
             image[first + k] = digitised(mean[first + k] + sigma[first + k] * table[start + k])
-
-
-def exposed(variance: tuple[float, float], mean: Floats, key: int, frame: int) -> npt.NDArray[np.uint8]:
-    """Return an 8-bit exposure of a mean image (height, width) float32; `variance` as a rig's `noise_variance`."""
-    sigma = deviations(mean.ravel(), *variance)
-    image = np.empty(mean.shape, dtype=np.uint8)
-    expose(mean.ravel(), sigma, quantile_table(), key, frame, image.reshape(-1))
-    return image

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from deskew.errors import require
+from deskew.errors import require, require_whole
 from deskew.types import Floats, Pinhole, Size
 
 
@@ -24,6 +24,9 @@ class RigConfig:
         Light of a code c is ``(c / 255) ** gamma`` of full light.
     projector_code : int
         Code of every lit projector pixel, 1 to 255.
+    driver_gamma : float
+        Exponent that the projector's driver takes off: for a share s of the lit pixels' light it sends the code
+        ``projector_code * s ** (1 / driver_gamma)``, rounded. Unlike `projector_gamma`, and the fringes are no sines.
     projector_contrast : float
         Full light over the light that leaks at code 0.
     exposure_grey : float
@@ -40,12 +43,21 @@ class RigConfig:
         Standard deviation of the noise at no signal [grey levels].
     noise_scale : float
         Factor on the standard deviation of shot and read noise together; 0 leaves the 8-bit rounding alone.
+    exposures : int
+        Exposures that the camera averages into one image, 1 to 256; from two on images have 16 bits. A line sweep takes
+        one.
+    late_share_max : float
+        Projector and camera out of step: the largest share of an exposure during which the projector still shows the
+        frame before (black before the first), drawn evenly from 0 to this for each frame.
+    repeated_share : float
+        Share of the frames in whose stead the camera catches the frame before once more.
     """
 
     camera_psf_sigma_px: float = 0.75
     projector_blur_sigma_px: float = 0.6
     projector_gamma: float = 2.2
     projector_code: int = 235
+    driver_gamma: float = 2.2
     projector_contrast: float = 500.0
     exposure_grey: float = 235.0
     ambient: float = 0.03
@@ -54,6 +66,9 @@ class RigConfig:
     shot_noise_grey: float = 0.017
     read_noise_grey: float = 0.8
     noise_scale: float = 1.0
+    exposures: int = 1
+    late_share_max: float = 0.0
+    repeated_share: float = 0.0
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -64,16 +79,25 @@ class RigConfig:
             ("projector_blur_sigma_px", 0.2, 3.0),
             ("projector_gamma", 0.5, 4.0),
             ("projector_code", 1, 255),
+            ("driver_gamma", 0.5, 4.0),
             ("projector_contrast", 2, np.inf),
             ("desk_albedo", 0, 1),
+            ("late_share_max", 0, 1),
+            ("repeated_share", 0, 1),
         ):
             value = getattr(self, name)
             require(low <= value <= high, name, f"be in [{low}, {high}]", value)
+        require_whole("exposures", self.exposures, 1, 256)
 
     @property
     def lit(self) -> float:
         """Light of a lit projector pixel over full light, without the leak that is always there."""
         return float((1 - self.leak) * (self.projector_code / 255) ** self.projector_gamma)
+
+    def shown(self, asked: Floats) -> Floats:
+        """Light that the projector gives where a share `asked` of a lit pixel's, in [0, 1], is sent to its driver."""
+        codes = np.rint(self.projector_code * asked ** (1 / self.driver_gamma))
+        return np.asarray((codes / self.projector_code) ** self.projector_gamma)
 
     @property
     def noise_variance(self) -> tuple[float, float]:

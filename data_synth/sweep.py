@@ -14,6 +14,7 @@ from data_synth.noise import RUN, deviation, deviations, digitised, expose, quan
 from data_synth.optics import PROFILE_STEPS, line_profile, psf_taps
 from data_synth.rig import RigConfig
 from data_synth.shading import SUBSAMPLES
+from data_synth.synchrony import frames_in
 from deskew.errors import require
 from deskew.types import Array, Floats
 
@@ -105,7 +106,12 @@ class _Painter:
         expose(mean, sigma, quantile_table(), sweep.key, number, image.reshape(-1))
         plane, spans, buffer = self.scratch
         profile = line_profile(sweep.config.projector_blur_sigma_px)
-        top, bottom = _scatter(self.starts, self.places, self.values, line, profile, plane, spans)
+        top, bottom = len(plane), -1
+        for shown, share in frames_in(sweep.config, sweep.key, number, line):
+            if shown >= 0:
+                weighted = np.float32(share) * profile
+                first, last = _scatter(self.starts, self.places, self.values, shown, weighted, plane, spans)
+                top, bottom = min(top, first), max(bottom, last)
         taps = psf_taps(sweep.config.camera_psf_sigma_px)
         _, width = sweep.black.shape
         strides = (width, 1) if sweep.upright else (1, width)
@@ -147,7 +153,10 @@ def _sorted_by_line(coordinate: Floats, light: Floats, n_lines: int, reach: floa
 def _scatter(
     starts: Ints, places: Ints, values: Floats, line: int, profile: Floats, plane: Floats, spans: Ints
 ) -> tuple[int, int]:
-    """Light the sub-samples near a line; `spans` gets each row's touched columns, the result the touched rows."""
+    """Add the light of a line to the sub-samples near it.
+
+    `spans` is widened to each row's touched columns; the result are the touched rows.
+    """
     n_lines = len(starts) - 1
     radius = len(profile) // PROFILE_STEPS + 1
     top, bottom = len(plane), -1
@@ -158,7 +167,7 @@ def _scatter(
         if i >= last:
             continue
         y, x = places[k, 0], places[k, 1]
-        plane[y, x] = values[k, 1] * (profile[i] + (distance - np.float32(i)) * (profile[i + 1] - profile[i]))
+        plane[y, x] += values[k, 1] * (profile[i] + (distance - np.float32(i)) * (profile[i + 1] - profile[i]))
         spans[y, 0] = min(spans[y, 0], x)
         spans[y, 1] = max(spans[y, 1], x)
         top, bottom = min(top, y), max(bottom, y)

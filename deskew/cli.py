@@ -23,7 +23,17 @@ from deskew.errors import DeskewError, StepError, require
 
 # The stages are imported inside the commands: --help and wrong options answer at once, without numba and OpenCV.
 if TYPE_CHECKING:
-    from deskew.types import Array, Calibration, Capture, DepthMap, Frames, Restoration, Scan
+    from deskew.types import (
+        Array,
+        Calibration,
+        Capture,
+        Correspondence,
+        DepthMap,
+        Frames,
+        ProjectorCheck,
+        Restoration,
+        Scan,
+    )
 
 app = typer.Typer(
     help="Restore an arbitrarily warped page from its 3D shape.",
@@ -119,7 +129,9 @@ def _scan(folder: Path, calibration: Calibration, shape: tuple[int, int], wanted
         wanted.check([WHITE, *capture.textures])
     from deskew import pipeline
 
-    return pipeline.scan(capture, calibration, shape=shape)
+    found = pipeline.scan(capture, calibration, shape=shape)
+    _warn(found.projector, folder.name)
+    return found
 
 
 def _plain(value: Any) -> Any:
@@ -154,6 +166,19 @@ def _depth_figures(depth: DepthMap) -> dict[str, Any]:
     return {"depth_pixels": int((reason == 0).sum()), "missing_pixels": missing}
 
 
+def _warn(check: ProjectorCheck, name: str) -> None:
+    """Say on stderr what is wrong with the projector; the work goes on, since only its user can judge the result."""
+    for fault in check.faults:
+        _say(f"warning: {name}: {fault}")
+
+
+def _projector_figures(check: ProjectorCheck) -> dict[str, Any]:
+    """Name what the frames say of the projector; nothing where they could not tell."""
+    known = {"projector_gamma": check.gamma, "projector_stray": check.stray}
+    figures: dict[str, Any] = {name: value for name, value in known.items() if value is not None}
+    return {**figures, "projector_faults": list(check.faults)} if figures or check.faults else {}
+
+
 def _restored_figures(restoration: Restoration) -> dict[str, Any]:
     """Status and counters; a page that did not come to rest flat is still shown, and said so on stderr."""
     from deskew.types import Status
@@ -183,10 +208,19 @@ def calibrate(
     io.require_writable(output, (".json",))
     board, captures = io.read_board(board_folder)
     watched = [_watched(capture, f"pose {i:02d}") for i, capture in enumerate(captures)]
-    calibration = pipeline.calibrate(board, watched)
+    checks: list[ProjectorCheck] = []
+
+    def watch(decoded: Correspondence) -> None:
+        _warn(decoded.projector, f"pose {len(checks):02d}")
+        checks.append(decoded.projector)
+
+    calibration = pipeline.calibrate(board, watched, watch=watch)
     io.write_calibration(calibration, output)
+    faulty = [f"pose_{i:02d}" for i, check in enumerate(checks) if check.faults]
     figures = {"n_poses": calibration.n_poses, **calibration.residuals, **calibration.convergence}
-    _report({"calibration": str(output), **figures}, as_json, output)
+    _report(
+        {"calibration": str(output), **figures} | ({"projector_faults_in": faulty} if faulty else {}), as_json, output
+    )
 
 
 @app.command()
@@ -216,7 +250,7 @@ def scan(
         texture[..., 1] = 1.0 - texture[..., 1]
         io.write_mesh(io.sheet_mesh(found.sheet, texture), output)
     figures = {"scan": str(output), "vertices": found.sheet.vertices[..., 0].size, **_depth_figures(found.depth)}
-    _report(figures, as_json, output)
+    _report(figures | _projector_figures(found.projector), as_json, output)
 
 
 @app.command()
@@ -255,7 +289,9 @@ def _flat_page(folder: Path, devices: Calibration) -> tuple[DepthMap, Array]:
 
     capture = _open(folder)
     acquisition.require_same_devices(devices, capture)
-    depth = acquisition.depth_map(devices, pipeline.decode(capture))
+    decoded = pipeline.decode(capture)
+    _warn(decoded.projector, folder.name)
+    depth = acquisition.depth_map(devices, decoded)
     corners = acquisition.page_outline(capture.white, capture.black, devices.camera, depth=depth).corners
     inside = np.zeros(depth.z.shape, np.uint8)
     cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)  # a flat page's outline has four straight sides
@@ -341,6 +377,7 @@ def _restore(found: Scan, method: str, output: Path, as_json: bool, wanted: _Wan
     for light, fit in restored.registrations.items():
         figures |= {f"{light}_scale": fit.scale.tolist(), f"{light}_offset_px": fit.offset.tolist()}
         figures[f"{light}_residual_px"] = fit.residual_px
+    figures |= _projector_figures(found.projector)
     for name, path in paths.items():
         io.write_image(pictures[name], path)
     _report(figures, as_json, output)

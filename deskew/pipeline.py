@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from deskew import acquisition, flattening, restoration
-from deskew.acquisition import (
-    DenoiseSettings,
-    DepthSettings,
-    GrayCodeSettings,
-    InkSettings,
-    Outline,
-    SweepSettings,
-)
+from deskew.acquisition import DecoderSettings, DenoiseSettings, DepthSettings, InkSettings, Outline
 from deskew.errors import StepError, require
 from deskew.restoration import Textures
 from deskew.types import (
@@ -26,36 +20,23 @@ from deskew.types import (
     Correspondence,
     DepthMap,
     Flattened,
-    PatternKind,
     Restoration,
     Scan,
     Status,
 )
 
 
-def decode(
-    capture: Capture, *, sweep: SweepSettings | None = None, gray: GrayCodeSettings | None = None
-) -> Correspondence:
-    """Decode a capture, whichever pattern it holds (section 2.3).
-
-    Parameters
-    ----------
-    capture : Capture
-        Line sweep or Gray code.
-    sweep, gray : settings, optional
-        Of the decoder for either kind.
-    """
-    if capture.pattern is PatternKind.LINE_SWEEP:
-        return acquisition.decode_sweep(capture, sweep)
-    return acquisition.decode_gray(capture, gray)
+def decode(capture: Capture, settings: DecoderSettings | None = None) -> Correspondence:
+    """Decode a capture, whichever pattern it holds (section 2.3); see :func:`deskew.acquisition.decode`."""
+    return acquisition.decode(capture, settings)
 
 
 def calibrate(
     board: Board,
     captures: Iterable[Capture],
     *,
-    sweep: SweepSettings | None = None,
-    gray: GrayCodeSettings | None = None,
+    settings: DecoderSettings | None = None,
+    watch: Callable[[Correspondence], None] | None = None,
 ) -> Calibration:
     """Calibrate camera and projector from captures of a printed board (section 2.2).
 
@@ -65,15 +46,22 @@ def calibrate(
         The printed board.
     captures : iterable of Capture
         One a pose, read one at a time; the first lies on the bed and defines the world.
-    sweep, gray : settings, optional
-        Of the decoder for either kind.
+    settings : DecoderSettings, optional
+        Of the decoder of the captures' pattern.
+    watch : callable, optional
+        Is given each pose as it is decoded, such as to see what its frames say of the projector.
 
     Raises
     ------
     StepError
         If a board is not found, or the poses do not determine the devices.
     """
-    views = [acquisition.view_board(board, capture, decode(capture, sweep=sweep, gray=gray)) for capture in captures]
+    views = []
+    for capture in captures:
+        decoded = decode(capture, settings)
+        if watch is not None:
+            watch(decoded)
+        views.append(acquisition.view_board(board, capture, decoded))
     return acquisition.calibrate(board, views)
 
 
@@ -85,8 +73,7 @@ def scan(
     decoded: Correspondence | None = None,
     outline: Outline | None = None,
     mask: npt.NDArray[np.bool_] | None = None,
-    sweep: SweepSettings | None = None,
-    gray: GrayCodeSettings | None = None,
+    settings: DecoderSettings | None = None,
     ink: InkSettings | None = None,
     depth: DepthSettings | None = None,
     denoise: DenoiseSettings | None = None,
@@ -108,11 +95,13 @@ def scan(
         The page's sides; found on the desk in the white and black frames if not given.
     mask : (height, width) bool array, optional
         The page in raw pixels, instead of `outline`.
-    sweep, gray, depth : settings, optional
-        Of the stages.
+    settings : DecoderSettings, optional
+        Of the decoder of the capture's pattern.
+    depth : DepthSettings, optional
+        Gates of the depth map.
     ink : InkSettings, optional
         Take out what ink does to the decoded coordinates; the paper does not, and by default nor is it done here. A
-        Gray code then keeps the edges of ink, unless `gray` says otherwise.
+        Gray code then keeps the edges of ink, unless `settings` say otherwise.
     denoise : DenoiseSettings, optional
         Of the filter that the depth map passes; none if not given, as in the paper.
     max_hole_px : float
@@ -124,15 +113,16 @@ def scan(
         If the capture and the calibration are not of devices of the same sizes.
     """
     acquisition.require_same_devices(calibration, capture)
-    if ink is not None and gray is None:
-        gray = GrayCodeSettings(ink_slope_max=None)
-    decoded = decoded or decode(capture, sweep=sweep, gray=gray)
+    if ink is not None and settings is None:
+        settings = acquisition.settings_for_ink(capture.pattern)
+    decoded = decoded or decode(capture, settings)
     if ink is not None:
         decoded = acquisition.correct_ink(calibration, decoded, capture, ink)
     depth_map = acquisition.depth_map(calibration, decoded, depth)
     if denoise is not None:
         depth_map = acquisition.denoise_depth(depth_map, denoise)
-    return span(capture, calibration, depth_map, shape=shape, outline=outline, mask=mask, max_hole_px=max_hole_px)
+    found = span(capture, calibration, depth_map, shape=shape, outline=outline, mask=mask, max_hole_px=max_hole_px)
+    return replace(found, projector=decoded.projector)
 
 
 def span(

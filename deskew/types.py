@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from deskew.errors import is_whole, require
+from deskew.errors import is_whole, require, require_positive, require_whole
 
 Array = npt.NDArray[Any]
 Floats = npt.NDArray[np.floating[Any]]
@@ -77,6 +78,69 @@ class PatternKind(StrEnum):
 
     LINE_SWEEP = "line_sweep"
     GRAY_CODE = "gray_code"
+    GRAY_PHASE = "gray_phase"
+    MULTI_PHASE = "multi_phase"
+
+
+@dataclass(frozen=True, slots=True)
+class Fringe:
+    """Sinusoidal frames of one period, shifted step by step.
+
+    Frame n of N lights projector line x by ``(1 + cos(2 pi x / period - 2 pi n / N)) / 2`` of full light.
+
+    Attributes
+    ----------
+    period_px : float
+        Projector pixels.
+    n_steps : int
+        Frames N, in [4, 256]: three would leave nothing to tell noise and harmonics by.
+    """
+
+    period_px: float
+    n_steps: int
+
+    def __post_init__(self) -> None:
+        require_positive("period_px", self.period_px, 1e6, "px")
+        require(self.period_px >= 4, "period_px", "be at least 4 px", self.period_px)
+        require_whole("n_steps", self.n_steps, 4, 256)
+
+
+Fringes = tuple[Fringe, ...]
+
+
+def n_planes(extent: int) -> int:
+    """Gray-code frames for `extent` projector columns or rows: one a bit, each followed by its inverse."""
+    return 2 * max(1, (extent - 1).bit_length())
+
+
+def half_periods(fringe: Fringe, extent: int) -> int:
+    """Half periods of a fringe, in whole pixels, that cover `extent` projector columns or rows."""
+    return -(-extent // (int(fringe.period_px) // 2))
+
+
+def n_frames(pattern: PatternKind, extent: int, fringes: Fringes = ()) -> int:
+    """Frames that code `extent` projector columns or rows, laid out as :class:`Capture` says."""
+    if pattern is PatternKind.LINE_SWEEP:
+        return extent
+    if pattern is PatternKind.GRAY_CODE:
+        return n_planes(extent)
+    planes = n_planes(half_periods(fringes[0], extent)) if pattern is PatternKind.GRAY_PHASE else 0
+    return planes + sum(fringe.n_steps for fringe in fringes)
+
+
+def require_fringes(pattern: PatternKind, fringes: Fringes, projector_size: Size) -> None:
+    """Raise an InputError unless `fringes` are what the pattern needs to tell every line of the projector."""
+    periods = [fringe.period_px for fringe in fringes]
+    if pattern is PatternKind.GRAY_PHASE:
+        even = len(periods) == 1 and periods[0] % 2 == 0
+        require(even, "fringes", f"be one of an even period for a {pattern}", periods)
+    elif pattern is PatternKind.MULTI_PHASE:
+        falling = len(periods) >= 2 and all(a > b for a, b in pairwise(periods))
+        require(falling, "fringes", f"be two or more of falling periods for a {pattern}", periods)
+        extent = max(projector_size)
+        require(periods[0] >= extent, "fringes", f"begin with a period of at least the projector's {extent}", periods)
+    else:
+        require(not periods, "fringes", f"be none for a {pattern}", periods)
 
 
 class Frames(Protocol):
@@ -104,10 +168,15 @@ class Capture:
     pattern : PatternKind
         `LINE_SWEEP`: frame i of `columns` lights projector column i, and likewise `rows`.
         `GRAY_CODE`: `columns` and `rows` hold the bit planes, most significant first, each followed by its inverse.
+        `GRAY_PHASE`: the bit planes of the number of the half period ``floor(2 x / period)``, then the fringe's steps.
+        `MULTI_PHASE`: the steps of each fringe, one after another.
     columns, rows : Frames
         The two sweeps; both are needed for epipolar culling.
     textures : mapping of light name to image
         Further images through the same optics, at any resolution (section 2.4).
+    fringes : tuple of Fringe
+        Of the phase patterns, the same for columns and rows: one of an even period for `GRAY_PHASE`; for `MULTI_PHASE`
+        two or more, the longest period first and no shorter than the projector's larger side.
     """
 
     white: Array
@@ -117,9 +186,11 @@ class Capture:
     columns: Frames
     rows: Frames
     textures: Mapping[str, Array] = field(default_factory=dict)
+    fringes: Fringes = ()
 
     def __post_init__(self) -> None:
         _require_size("projector_size", self.projector_size)
+        require_fringes(self.pattern, self.fringes, self.projector_size)
         require(WHITE not in self.textures, "textures", "have names of their own", f"one called {WHITE}")
         for name in ("white", "black"):
             image = getattr(self, name)
@@ -133,8 +204,7 @@ class Capture:
             ("columns", self.columns, self.projector_size[0]),
             ("rows", self.rows, self.projector_size[1]),
         ):
-            n_bits = max(1, (extent - 1).bit_length())
-            wanted = extent if self.pattern is PatternKind.LINE_SWEEP else 2 * n_bits
+            wanted = n_frames(self.pattern, extent, self.fringes)
             require(len(frames) == wanted, name, f"hold {wanted} frames for a {self.pattern} of {extent}", len(frames))
 
     @property
@@ -186,6 +256,26 @@ def _require_reasons(reason: Array) -> None:
 
 
 @dataclass(frozen=True, slots=True)
+class ProjectorCheck:
+    """What the frames of a capture say about the projector, and the camera, that made them.
+
+    Attributes
+    ----------
+    faults : tuple of str
+        A plain sentence for each fault found; empty where the frames agree with one another.
+    gamma : float or None
+        Fringes only: brightness seen grows with the light asked for to this power, 1 for a linear projector and camera.
+    stray : float or None
+        Share of a frame's light, root mean square, that comes from a frame other than the one its place in the sequence
+        says; 0 if camera and projector are in step. None if hardly any pixel was bright enough to tell.
+    """
+
+    faults: tuple[str, ...] = ()
+    gamma: float | None = None
+    stray: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Correspondence:
     """Projector coordinates seen by each raw camera pixel.
 
@@ -198,12 +288,15 @@ class Correspondence:
     stripe_px : (width, height) or None
         Of a sweep read curve by curve: typical standard deviation of a stripe of the columns across image rows and of
         one of the rows across image columns [camera px]. None if each pixel was read by itself.
+    projector : ProjectorCheck
+        What the frames say about the projector.
     """
 
     column: Floats
     row: Floats
     reason: npt.NDArray[np.uint8]
     stripe_px: tuple[float, float] | None = None
+    projector: ProjectorCheck = ProjectorCheck()
 
     def __post_init__(self) -> None:
         shape = self.column.shape
@@ -396,6 +489,8 @@ class Scan:
     outline : (4, 2) array
         The page's corners on the undistorted grid [px], in the grid's order: first row's first and last vertex, last
         row's last and first.
+    projector : ProjectorCheck
+        What the capture's frames say about the projector; a file does not keep it.
     """
 
     images: Mapping[str, Array]
@@ -403,6 +498,7 @@ class Scan:
     camera: Pinhole
     sheet: Sheet
     outline: Floats
+    projector: ProjectorCheck = ProjectorCheck()
 
 
 @dataclass(frozen=True, slots=True)

@@ -158,6 +158,18 @@ class RealBoardsSettings(Checked):
 
 
 @dataclass
+class DecodersSettings(Checked):
+    """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
+
+    group: ClassVar[str] = "decoders."
+    frames: list[int] = setting(
+        [40, 160, 1792],
+        "be a list of different whole numbers in [40, 10000]",
+        lambda value: len(set(value)) == len(value) > 0 and all(40 <= n <= 10_000 for n in value),
+    )
+
+
+@dataclass
 class Config(Checked):
     """The whole configuration of one run."""
 
@@ -177,6 +189,7 @@ class Config(Checked):
     rig: RigSettings = field(default_factory=RigSettings)
     scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
+    decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
 
     def __post_init__(self) -> None:

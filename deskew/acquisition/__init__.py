@@ -15,6 +15,7 @@ from deskew.acquisition.corners import (
     refine_kitchen_rosenfeld,
     refine_saddle,
 )
+from deskew.acquisition.decoding import DecoderSettings, decode, settings_for_ink
 from deskew.acquisition.denoise import DenoiseSettings, denoise_depth, depth_noise
 from deskew.acquisition.depthmap import DepthSettings, depth_map
 from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
@@ -22,24 +23,29 @@ from deskew.acquisition.ink import InkSettings, correct_ink
 from deskew.acquisition.matches import require_same_devices
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, page_outline, straight_outline
+from deskew.acquisition.phase import PhaseSettings, decode_phase
 from deskew.acquisition.stripes import decode_sweep
 from deskew.acquisition.sweep import SweepSettings
 
 __all__ = [
     "BoardView",
+    "DecoderSettings",
     "DenoiseSettings",
     "DepthSettings",
     "GrayCodeSettings",
     "InkSettings",
     "Outline",
     "PageMesh",
+    "PhaseSettings",
     "PlaneDeviation",
     "SweepSettings",
     "average_deviation",
     "board_points",
     "calibrate",
     "correct_ink",
+    "decode",
     "decode_gray",
+    "decode_phase",
     "decode_sweep",
     "denoise_depth",
     "depth_map",
@@ -56,6 +62,7 @@ __all__ = [
     "refine_kitchen_rosenfeld",
     "refine_saddle",
     "require_same_devices",
+    "settings_for_ink",
     "straight_outline",
     "view_board",
 ]

@@ -14,12 +14,20 @@ import numpy as np
 from numba import njit
 from scipy import ndimage
 
+from deskew.acquisition.framenoise import noise_at, variance_by_level
 from deskew.acquisition.frames import read_frames
 from deskew.acquisition.grey import grey_levels
+from deskew.acquisition.projectorcheck import (
+    clipping_level,
+    join_checks,
+    light_to_judge,
+    pair_stray,
+    planes_check,
+)
 from deskew.errors import require, require_positive, require_whole
 from deskew.types import Array, Capture, Correspondence, Floats, PatternKind, Reason
 
-_ROUNDING = float(1 / np.sqrt(12))  # no camera is quieter than the rounding of its grey levels
+_SQUARED_MEDIAN = 1.4826**-2  # of a squared normal variable, over its mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,19 +96,23 @@ def decode_gray(capture: Capture, settings: GrayCodeSettings | None = None) -> C
     settings = settings or GrayCodeSettings()
     still = grey_levels(capture.white, "white")
     white, black = (image.astype(np.float64) for image in (still, grey_levels(capture.black, "black")))
-    columns, noise = _differences(read_frames(capture.columns, still, "columns"), white + black)
-    rows, _ = _differences(read_frames(capture.rows, still, "rows"), white + black)
+    judged = light_to_judge(white, black, clipping_level(still))
+    columns = read_planes(read_frames(capture.columns, still, "columns"), white, black, judged)
+    rows = read_planes(read_frames(capture.rows, still, "rows"), white, black, judged)
+    noise = columns.noise
     shadow = white - black < settings.shadow_snr * noise
     # A border between rows runs along the image's x: transpose, so that both sweeps are read along the last axis.
-    column = _decode_axis(columns, shadow, noise, capture.projector_size[0], settings)
-    row = _decode_axis(rows.transpose(0, 2, 1), shadow.T, noise.T, capture.projector_size[1], settings).T
+    column = _decode_axis(columns.differences, shadow, noise, capture.projector_size[0], settings)
+    turned = rows.differences.transpose(0, 2, 1)
+    row = _decode_axis(turned, shadow.T, noise.T, capture.projector_size[1], settings).T
     reason = np.full(shadow.shape, Reason.OK, dtype=np.uint8)
     reason[~np.isfinite(column) | ~np.isfinite(row)] = Reason.WEAK
     if settings.ink_slope_max is not None:
         reason[(reason == Reason.OK) & (_ink_slope(white - black, noise) > settings.ink_slope_max)] = Reason.EDGE
     reason[shadow] = Reason.SHADOW
     missing = reason != Reason.OK
-    return Correspondence(np.where(missing, np.nan, column), np.where(missing, np.nan, row), reason)
+    check = join_checks(planes_check(columns.stray, "columns"), planes_check(rows.stray, "rows"))
+    return Correspondence(np.where(missing, np.nan, column), np.where(missing, np.nan, row), reason, projector=check)
 
 
 def _ink_slope(lit: Floats, noise: Floats) -> Floats:
@@ -109,32 +121,49 @@ def _ink_slope(lit: Floats, noise: Floats) -> Floats:
     return np.asarray(ndimage.gaussian_gradient_magnitude(lit, 1.0) / smooth)
 
 
-def _differences(planes: Iterator[Array], both: Floats) -> tuple[Floats, Floats]:
-    """Pattern minus inverse of each bit, (bits, height, width), and each pixel's noise in one frame [grey levels].
+@dataclass(frozen=True, slots=True)
+class Planes:
+    """Bit planes of one axis, read.
 
-    Light adds up: pattern + inverse - (white + black) is noise alone, of four frames.
+    Attributes
+    ----------
+    differences : (bits, height, width) float32 array
+        Pattern minus inverse, most significant first [grey levels].
+    noise : (height, width) array
+        Standard deviation of each pixel in one frame [grey levels].
+    stray : (bits, 2) array
+        :func:`pair_stray` of each.
     """
-    differences, noise = [], []
+
+    differences: Floats
+    noise: Floats
+    stray: Floats
+
+
+def read_planes(planes: Iterator[Array], white: Floats, black: Floats, judged: Floats) -> Planes:
+    """Read bit planes, each followed by its inverse.
+
+    Light adds up: pattern + inverse - (white + black) is noise alone, of four frames, where camera and projector are in
+    step.
+
+    Parameters
+    ----------
+    planes : iterator of (height, width) arrays
+        Read to its end.
+    white, black : (height, width) arrays
+        Grey levels.
+    judged : (height, width) array
+        White - black where it is not clipped, else 0 [grey levels].
+    """
+    both = white + black
+    differences, lines, stray = [], [], []
     for pattern, inverse in zip(planes, planes, strict=True):
         light, dark = pattern.astype(np.float32), inverse.astype(np.float32)
         differences.append(light - dark)
-        noise.append(_noise_by_level(light + dark - both, both))
-    variance = np.median(noise, axis=0) / 4
-    levels = np.linspace(0.0, 1.0, len(variance)) * float(both.max())
-    return np.stack(differences), np.sqrt(np.maximum(np.interp(both, levels, variance), _ROUNDING**2))
-
-
-def _noise_by_level(residual: Floats, both: Floats, n_bins: int = 8) -> Floats:
-    """Robust variance of the residual at even grey levels, (n_bins,): read noise plus shot noise, a straight line."""
-    edges = np.unique(np.quantile(both, np.linspace(0.0, 1.0, n_bins + 1)))
-    members = np.clip(np.searchsorted(edges, both, side="right") - 1, 0, max(len(edges) - 2, 0))
-    levels, variances = [], []
-    for i in range(max(len(edges) - 1, 1)):
-        chosen = members == i
-        levels.append(float(both[chosen].mean()))
-        variances.append((1.4826 * float(np.median(np.abs(residual[chosen])))) ** 2)
-    line = np.polynomial.Polynomial.fit(levels, variances, 1 if len(levels) > 2 else 0)
-    return np.asarray(line(np.linspace(0.0, 1.0, n_bins) * float(both.max())))
+        residual = light + dark - both
+        lines.append(variance_by_level(residual**2, both, 4.0 * _SQUARED_MEDIAN))
+        stray.append(pair_stray(residual, judged))
+    return Planes(np.stack(differences), noise_at(np.median(lines, axis=0), both), np.array(stray))
 
 
 def _decode_axis(differences: Floats, shadow: Array, noise: Floats, extent: int, settings: GrayCodeSettings) -> Floats:
@@ -149,7 +178,7 @@ def _decode_axis(differences: Floats, shadow: Array, noise: Floats, extent: int,
     n_dropped_max = min(settings.n_dropped_max, len(differences) - 1) if settings.subpixel else 0
     for n_dropped in range(1 + n_dropped_max):
         n_bits = len(differences) - n_dropped
-        index = _gray_to_index(differences[:n_bits] > 0)
+        index = gray_to_index(differences[:n_bits] > 0)
         beyond = (index << n_dropped) >= extent
         # At a border exactly one bit is grey by nature; two grey bits cannot be trusted.
         weak = (faint[:n_bits].sum(axis=0) > 1) | beyond | shadow
@@ -160,7 +189,7 @@ def _decode_axis(differences: Floats, shadow: Array, noise: Floats, extent: int,
     return coordinate
 
 
-def _gray_to_index(bits: Array) -> Array:
+def gray_to_index(bits: Array) -> Array:
     """Gray code (bits, height, width), most significant first, to integers."""
     binary = np.logical_xor.accumulate(bits, axis=0)
     weights = 1 << np.arange(len(bits) - 1, -1, -1)

@@ -8,22 +8,29 @@ from __future__ import annotations
 import numpy as np
 
 from deskew.acquisition.frames import read_frames
+from deskew.acquisition.projectorcheck import join_checks, light_to_judge
 from deskew.acquisition.sweep import Scene, Sweep, SweepSettings, still_scene
 from deskew.acquisition.sweep_spatial import decode_spatial
 from deskew.acquisition.sweep_temporal import decode_temporal
+from deskew.acquisition.sweepcheck import SweepWatch
 from deskew.errors import StepError, require
-from deskew.types import Capture, Correspondence, Frames, PatternKind, Reason
+from deskew.types import Capture, Correspondence, Frames, PatternKind, ProjectorCheck, Reason
 
 __all__ = ["SweepSettings", "decode_sweep"]
 
 
-def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) -> Sweep:
+def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) -> tuple[Sweep, ProjectorCheck]:
     n_frames = len(frames)
     require(n_frames >= settings.window, name, f"hold at least {settings.window} frames, one window", n_frames)
-    grey = read_frames(frames, scene.white, name)
+    along_rows = name == "columns"
+    judged = light_to_judge(scene.white, scene.black, scene.saturated_level)
+    watch = SweepWatch(judged, columns=along_rows)
+    grey = map(watch.passing, read_frames(frames, scene.white, name))
     if settings.mode == "temporal":
-        return decode_temporal(grey, n_frames, scene, settings)
-    return decode_spatial(grey, n_frames, scene, settings, along_rows=name == "columns")
+        sweep = decode_temporal(grey, n_frames, scene, settings)
+    else:
+        sweep = decode_spatial(grey, n_frames, scene, settings, along_rows=along_rows)
+    return sweep, watch.check(name)
 
 
 def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Correspondence:
@@ -53,8 +60,8 @@ def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Cor
     kind = capture.pattern
     require(kind is PatternKind.LINE_SWEEP, "pattern", f"be {PatternKind.LINE_SWEEP} for decode_sweep", kind)
     scene = still_scene(capture, settings)
-    columns = _decode(capture.columns, "columns", scene, settings)
-    rows = _decode(capture.rows, "rows", scene, settings)
+    columns, columns_check = _decode(capture.columns, "columns", scene, settings)
+    rows, rows_check = _decode(capture.rows, "rows", scene, settings)
     reason = np.where(columns.reason != Reason.OK, columns.reason, rows.reason).astype(np.uint8)
     ok = reason == Reason.OK
     if not ok.any():
@@ -71,4 +78,5 @@ def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Cor
         np.where(ok, rows.position, missing),
         reason,
         (columns.width, rows.width) if settings.mode == "spatial" else None,
+        join_checks(columns_check, rows_check),
     )

@@ -7,11 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from deskew.errors import require
-from deskew.io.captures import StoredFrames, n_planes, numbered, read_capture, read_pair, write_capture
+from deskew.io.captures import StoredFrames, numbered, read_capture, read_pair, write_capture
 from deskew.io.fields import Fields
 from deskew.io.files import read_toml, replacing_folder, require_folder, require_inside, shown
 from deskew.io.images import png_size
-from deskew.types import Board, Capture, PatternKind, Size
+from deskew.types import Board, Capture, PatternKind, Size, n_planes
 
 BOARD_VERSION = 1
 MAX_CORNERS = 1000

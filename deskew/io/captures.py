@@ -1,9 +1,9 @@
 """Capture folders: what a camera saw of one still page, on disk.
 
 ``capture.toml`` states sizes, pattern and lights; beside it lie ``white.png`` and ``black.png``, the frames in
-``columns/`` and ``rows/`` (line sweep: one frame a projector column and row) or in ``gray/`` (Gray code: columns then
-rows, most significant bit first, each pattern followed by its inverse), named by their zero-padded number from 0, and
-``textures/LIGHT.png``, at any resolution, for every named light.
+``columns/`` and ``rows/`` (line sweep: one frame a projector column and row; phase patterns: as `Capture` orders them)
+or in ``gray/`` (Gray code: columns then rows, most significant bit first, each pattern followed by its inverse), named
+by their zero-padded number from 0, and ``textures/LIGHT.png``, at any resolution, for every named light.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from deskew.errors import require
+from deskew.errors import InputError, require
 from deskew.io.fields import Fields
 from deskew.io.files import read_toml, replacing_folder, require_folder, require_inside, shown
 from deskew.io.images import encoded, png_size, read_image, require_picture
-from deskew.types import Array, Capture, Frames, PatternKind, Size
+from deskew.types import Array, Capture, Frames, Fringe, Fringes, PatternKind, Size, n_frames, require_fringes
 
 CAPTURE_VERSION = 1
 MAX_LIGHTS = 256
+MAX_FRINGES = 16
 
 _IMAGE_NAMES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp")
 _LIGHT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
@@ -84,11 +85,6 @@ def read_pair(white_path: Path, black_path: Path, size: Size) -> tuple[Array, Ar
     return white, black
 
 
-def n_planes(extent: int) -> int:
-    """Gray-code frames for `extent` projector columns or rows: one a bit, each followed by its inverse."""
-    return 2 * max(1, (extent - 1).bit_length())
-
-
 def _images_in(folder: Path) -> list[str]:
     """Names of the images in a folder; hidden files and what desktops leave behind are no images."""
     require_folder(folder)
@@ -135,14 +131,33 @@ def _lights(fields: Fields, folder: Path) -> StoredTextures:
     return StoredTextures(paths)
 
 
-def _sweeps(folder: Path, pattern: PatternKind, projector_size: Size, white: Array) -> tuple[Frames, Frames]:
-    n_columns, n_rows = projector_size
-    if pattern is PatternKind.LINE_SWEEP:
-        columns = numbered(folder / "columns", n_columns, folder)
-        return StoredFrames(columns, white), StoredFrames(numbered(folder / "rows", n_rows, folder), white)
-    n_columns, n_rows = n_planes(n_columns), n_planes(n_rows)
-    planes = numbered(folder / "gray", n_columns + n_rows, folder)
-    return StoredFrames(planes[:n_columns], white), StoredFrames(planes[n_columns:], white)
+def _fringes(fields: Fields, pattern: PatternKind, projector_size: Size) -> Fringes:
+    """Periods and steps of a phase pattern; the other patterns have none."""
+    if pattern in (PatternKind.LINE_SWEEP, PatternKind.GRAY_CODE):
+        none = "fringes" not in fields.values
+        require(none, f"{fields.name}: fringes", f"be left out for a {pattern}", shown(fields.values.get("fringes")))
+        return ()
+    periods = fields.table("fringes").numbers("period_px", MAX_FRINGES)
+    steps = fields.table("fringes").numbers("n_steps", MAX_FRINGES)
+    alike = len(steps) == len(periods)
+    require(alike, f"{fields.name}: fringes", "have as many n_steps as period_px", f"{len(steps)} and {len(periods)}")
+    try:
+        fringes = tuple(Fringe(float(p), n) for p, n in zip(periods, steps, strict=True))  # type: ignore[arg-type]
+        require_fringes(pattern, fringes, projector_size)
+    except InputError as error:
+        raise InputError(f"`{fields.name}`: {error}") from error
+    return fringes
+
+
+def _sweeps(
+    folder: Path, pattern: PatternKind, fringes: Fringes, projector_size: Size, white: Array
+) -> tuple[Frames, Frames]:
+    n_columns, n_rows = (n_frames(pattern, extent, fringes) for extent in projector_size)
+    if pattern is PatternKind.GRAY_CODE:
+        planes = numbered(folder / "gray", n_columns + n_rows, folder)
+        return StoredFrames(planes[:n_columns], white), StoredFrames(planes[n_columns:], white)
+    columns = numbered(folder / "columns", n_columns, folder)
+    return StoredFrames(columns, white), StoredFrames(numbered(folder / "rows", n_rows, folder), white)
 
 
 def read_capture(folder: Path) -> Capture:
@@ -170,7 +185,7 @@ def read_capture(folder: Path) -> Capture:
     require_folder(folder)
     require_inside(folder / "capture.toml", folder)
     fields = Fields(read_toml(folder / "capture.toml"), str(folder / "capture.toml"))
-    fields.only(("version", "pattern", "camera_size_px", "projector_size_px"), ("lights",))
+    fields.only(("version", "pattern", "camera_size_px", "projector_size_px"), ("lights", "fringes"))
     fields.version("version", CAPTURE_VERSION)
     pattern = PatternKind(fields.word("pattern", tuple(PatternKind)))
     camera_size, projector_size = fields.pair("camera_size_px"), fields.pair("projector_size_px")
@@ -178,8 +193,9 @@ def read_capture(folder: Path) -> Capture:
         require_inside(folder / name, folder)
     white, black = read_pair(folder / "white.png", folder / "black.png", camera_size)
     textures = _lights(fields, folder)
-    columns, rows = _sweeps(folder, pattern, projector_size, white)
-    return Capture(white, black, projector_size, pattern, columns, rows, textures)
+    fringes = _fringes(fields, pattern, projector_size)
+    columns, rows = _sweeps(folder, pattern, fringes, projector_size, white)
+    return Capture(white, black, projector_size, pattern, columns, rows, textures, fringes)
 
 
 def _write_picture(image: Array, path: Path) -> None:
@@ -200,8 +216,15 @@ def _settings(capture: Capture) -> str:
     return (
         f'version = {CAPTURE_VERSION}\npattern = "{capture.pattern}"\n'
         f"camera_size_px = {list(capture.camera_size)}\nprojector_size_px = {list(capture.projector_size)}\n"
-        f"lights = [{lights}]\n"
+        f"lights = [{lights}]\n{_fringe_table(capture.fringes)}"
     )
+
+
+def _fringe_table(fringes: Fringes) -> str:
+    if not fringes:
+        return ""
+    periods, steps = [float(f.period_px) for f in fringes], [int(f.n_steps) for f in fringes]
+    return f"\n[fringes]\nperiod_px = {periods}\nn_steps = {steps}\n"
 
 
 def write_capture(capture: Capture, folder: Path) -> None:
@@ -224,10 +247,10 @@ def write_capture(capture: Capture, folder: Path) -> None:
     for light in capture.textures:
         named = bool(_LIGHT.fullmatch(light))
         require(named, "textures", "have names made of letters, digits, - and _", shown(light))
-    sweep = capture.pattern is PatternKind.LINE_SWEEP
+    gray = capture.pattern is PatternKind.GRAY_CODE
     n_columns, n_rows = len(capture.columns), len(capture.rows)
-    digits = max(4, len(str(max(n_columns, n_rows) - 1))) if sweep else 2
-    first_row = 0 if sweep else n_columns
+    digits = 2 if gray else max(4, len(str(max(n_columns, n_rows) - 1)))
+    first_row = n_columns if gray else 0
     column_names = [f"{i:0{digits}d}.png" for i in range(n_columns)]
     row_names = [f"{i:0{digits}d}.png" for i in range(first_row, first_row + n_rows)]
     with replacing_folder(Path(folder)) as new:
@@ -237,5 +260,5 @@ def write_capture(capture: Capture, folder: Path) -> None:
         for light, image in capture.textures.items():
             (new / "textures").mkdir(exist_ok=True)
             _write_picture(image, new / "textures" / f"{light}.png")
-        _write_frames(capture.columns, new / ("columns" if sweep else "gray"), capture.white, column_names)
-        _write_frames(capture.rows, new / ("rows" if sweep else "gray"), capture.white, row_names)
+        _write_frames(capture.columns, new / ("gray" if gray else "columns"), capture.white, column_names)
+        _write_frames(capture.rows, new / ("gray" if gray else "rows"), capture.white, row_names)

@@ -103,11 +103,18 @@ class Fields:
         require(fits(value, shape), self._at(key), f"hold {extents} finite numbers", shown(value))
         return np.array(value, dtype=np.float64)
 
+    def numbers(self, key: str, most: int) -> list[int | float]:
+        """Return a list of 1 to `most` finite numbers, each as it was written."""
+        value = self.values.get(key)
+        good = isinstance(value, list) and 1 <= len(value) <= most and all(_is_number(v) for v in value)
+        require(good, self._at(key), f"be a list of 1 to {most} finite numbers", shown(value))
+        return list(value or ())
+
     def table(self, key: str) -> Fields:
         """Return a table within this one."""
-        value = self.values[key]
+        value = self.values.get(key)
         require(isinstance(value, dict), self._at(key), "be a table", shown(value))
-        return Fields(value, self._at(key))
+        return Fields(dict(value or {}), self._at(key))
 
     def deviations(self) -> dict[str, float]:
         """Return the whole table as finite numbers of at least 0."""

@@ -10,6 +10,7 @@ from experiments.studies.study import AbsentError, Study
 STUDIES = {
     "plane_accuracy": "experiments.studies.plane_accuracy:PlaneAccuracy",
     "corner_distance": "experiments.studies.corner_distance:CornerDistance",
+    "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
     "real_boards": "experiments.studies.real_boards:RealBoards",
 }

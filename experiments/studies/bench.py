@@ -25,10 +25,23 @@ class Bench:
     calibration: Calibration
 
     def residuals(self) -> dict[str, float]:
-        """Return `calib_{camera,projector,stereo}_rms_px`."""
-        return {
-            f"calib_{name}": value for name, value in self.calibration.residuals.items() if name.endswith("_rms_px")
-        }
+        """Return :func:`calibration_figures` in millimetres."""
+        return calibration_figures(self.calibration, "mm")
+
+
+def calibration_figures(calibration: Calibration, unit: str) -> dict[str, float]:
+    """Return `calib_{camera,projector,stereo}_rms_px` and, on boards left out, `calib_held_out_...`.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        The figures' source.
+    unit : str
+        What its lengths are called in a metric's name: "mm" or "units".
+    """
+    figures = {f"calib_{name}": value for name, value in calibration.residuals.items()}
+    length = figures.pop("calib_held_out_length_rms", None)
+    return figures if length is None else figures | {f"calib_held_out_length_rms_{unit}": length}
 
 
 def calibrated_bench(config: Config) -> Bench:
@@ -37,4 +50,4 @@ def calibrated_bench(config: Config) -> Bench:
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
-    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, sweep=SweepSettings(mode=config.scan.mode)))
+    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, settings=SweepSettings(mode=config.scan.mode)))

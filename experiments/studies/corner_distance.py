@@ -160,12 +160,12 @@ class _Trial:
 
     def scanned(self, config: Config, capture: Capture) -> Scan | None:
         """Scan the page and measure the depth map; None if that failed, which fails every method."""
-        shape, sweep = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
+        shape, decoder = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
         calibration, ink = self.bench.calibration, InkSettings() if config.scan.ink else None
         try:
             # The sweeps are rendered while they are decoded: this stage holds both.
             with self.record.stage("scan"):
-                scan = pipeline.scan(capture, calibration, shape=shape, sweep=sweep, ink=ink)
+                scan = pipeline.scan(capture, calibration, shape=shape, settings=decoder, ink=ink)
             raw = scan.depth
             if config.scan.denoise:
                 with self.record.stage("denoise"):

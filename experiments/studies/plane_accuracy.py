@@ -94,7 +94,7 @@ def _measure(
     sheet = data_synth.plane(page.page_size_mm, tilt_deg=lean_deg[0], azimuth_deg=lean_deg[1])
     with record.stage("scan", condition):
         capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-        correspondence = pipeline.decode(capture, sweep=SweepSettings(mode=settings.mode))
+        correspondence = pipeline.decode(capture, SweepSettings(mode=settings.mode))
         if settings.ink:
             correspondence = acquisition.correct_ink(bench.calibration, correspondence, capture)
     with record.stage("depth", condition):

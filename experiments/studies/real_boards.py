@@ -16,6 +16,7 @@ from deskew.errors import InputError, require
 from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Sheet
 from experiments.reporting import Column, Layout, Montage
 from experiments.settings import Config
+from experiments.studies.bench import calibration_figures
 from experiments.studies.flattened import flattening_figures
 from experiments.studies.methods import require_methods
 from experiments.studies.scanned import scanned_points
@@ -115,7 +116,7 @@ class RealBoards(Study):
         with record.stage("calibrate"):
             kept = [v for i, v in enumerate(boards.views) if key.condition == "calibration" or i != key.trial]
             calibration = acquisition.calibrate(BOARD, kept)
-        residuals = {f"calib_{name}": value for name, value in calibration.residuals.items()}
+        residuals = calibration_figures(calibration, "units")
         if key.condition == "calibration":
             record.add("calibration", "-", residuals)
             return record.outcome()

@@ -141,7 +141,7 @@ def _scanned(config: Config, bench: Bench, capture: Any) -> Scan:
         capture,
         bench.calibration,
         shape=(config.mesh.rows, config.mesh.columns),
-        sweep=SweepSettings(mode=config.scan.mode),
+        settings=SweepSettings(mode=config.scan.mode),
         ink=InkSettings() if config.scan.ink else None,
         denoise=DenoiseSettings() if config.scan.denoise else None,
     )

@@ -24,10 +24,12 @@ from deskew.types import (
     Board,
     Calibration,
     Capture,
+    Correspondence,
     DepthMap,
     Flattened,
     PatternKind,
     Pinhole,
+    ProjectorCheck,
     Scan,
     Sheet,
     Status,
@@ -58,14 +60,19 @@ class StandIn:
         self.calls: dict[str, Any] = {}
         self.status = Status.AT_REST
         self.fails: str | None = None
+        self.check = ProjectorCheck()
 
     def _step(self, name: str, **values: Any) -> None:
         if self.fails == name:
             raise StepError(f"{name} found no page: put it on a darker desk.")
         self.calls[name] = values
 
-    def calibrate(self, board: Board, captures: Iterable[Capture]) -> Calibration:
+    def calibrate(
+        self, board: Board, captures: Iterable[Capture], *, watch: Callable[[Correspondence], None]
+    ) -> Calibration:
         poses = [np.stack([*c.columns, *c.rows]) for c in captures]
+        for _ in poses:
+            watch(Correspondence(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((1, 1), np.uint8), None, self.check))
         self._step("calibrate", board=board, poses=poses)
         return replace(CALIBRATION, n_poses=len(poses))
 
@@ -77,7 +84,7 @@ class StandIn:
         depth = DepthMap(np.where(reason == 0, 9.0, np.nan), reason, CAMERA)
         x, y = np.meshgrid(np.linspace(-1, 1, shape[1]), np.linspace(1, -1, shape[0]))
         sheet = Sheet(np.stack([x, y, 0 * x], -1))
-        return Scan({"white": page.white, **page.textures}, depth, CAMERA, sheet, np.zeros((4, 2)))
+        return Scan({"white": page.white, **page.textures}, depth, CAMERA, sheet, np.zeros((4, 2)), self.check)
 
     def restore_lights(self, scan: Scan, *, method: str, lights: Sequence[str], scale: float) -> Textures:
         self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale)
@@ -195,7 +202,11 @@ def test_accuracy_measures_the_page_and_not_the_desk(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     acquisition = importlib.import_module("deskew.acquisition")
-    monkeypatch.setattr(deskew, "pipeline", SimpleNamespace(decode=lambda page: len(list(page.columns))), raising=False)
+
+    def decoded(page: Capture) -> SimpleNamespace:
+        return SimpleNamespace(n=len(list(page.columns)), projector=ProjectorCheck())
+
+    monkeypatch.setattr(deskew, "pipeline", SimpleNamespace(decode=decoded), raising=False)
     z = np.full((8, 12), 9.0)
     z[:, :3] = 5.0  # the desk
     z[4, 6] = 9.5
@@ -216,6 +227,30 @@ def test_accuracy_refuses_a_capture_of_another_projector(here: Path, capsys: pyt
     io.write_calibration(replace(CALIBRATION, projector=CAMERA), here / "c.json")
     wanted = "deskew: `capture.projector_size` must equal calibration.projector.size (12, 8), got (6, 5).\n"
     assert run("accuracy page -c c.json", capsys) == (2, "", wanted)
+
+
+@pytest.mark.parametrize("line", ["scan page -c c.json -o out/s.npz", "run page -c c.json -o out/r.png"])
+def test_a_faulty_projector_is_said_on_stderr_and_in_the_figures(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], line: str
+) -> None:
+    steps.check = ProjectorCheck(("The fringes are no sines.", "Out of step."), gamma=1.4, stray=0.2)
+    code, out, err = run(f"{line} --json", capsys)
+    figures = json.loads(out)
+    assert (code, figures["projector_gamma"], figures["projector_stray"]) == (0, 1.4, 0.2)
+    assert figures["projector_faults"] == list(steps.check.faults)
+    assert err == "".join(f"deskew: warning: page: {fault}\n" for fault in steps.check.faults)
+    steps.check = ProjectorCheck(stray=0.001)
+    code, out, err = run(f"{line.replace('out/', 'out/2')} --json", capsys)
+    assert (code, json.loads(out)["projector_faults"], err) == (0, [], "")
+
+
+def test_calibrate_says_which_pose_shows_a_faulty_projector(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    steps.check = ProjectorCheck(("Out of step.",), stray=0.2)
+    code, out, err = run("calibrate board -o out/c.json --json", capsys)
+    assert (code, json.loads(out)["projector_faults_in"]) == (0, ["pose_00", "pose_01"])
+    assert err == "deskew: warning: pose 00: Out of step.\ndeskew: warning: pose 01: Out of step.\n"
 
 
 @pytest.mark.parametrize("status", [Status.LOCKED, Status.FOLDED])

@@ -76,11 +76,11 @@ def test_a_gray_code_keeps_the_edges_of_ink_when_they_are_corrected(monkeypatch,
     def record(capture, settings):
         raise Decoded(settings or GrayCodeSettings())
 
-    monkeypatch.setattr(acquisition, "decode_gray", record)
+    monkeypatch.setattr(acquisition, "decode", record)
     known = calibration(data_synth.default_rig())
     picture = np.zeros(known.camera.size[::-1], np.uint8)
     frames = [picture] * 20  # 10 bits and their inverses
     capture = Capture(picture, picture, known.projector.size, PatternKind.GRAY_CODE, frames, frames)
     with pytest.raises(Decoded) as asked:
-        pipeline.scan(capture, known, ink=ink, gray=given)
+        pipeline.scan(capture, known, ink=ink, settings=given)
     assert asked.value.args[0].ink_slope_max == limit

@@ -67,7 +67,7 @@ def test_a_plane_is_flat(rig, calibration, page, most_mm):
 def test_spatial_and_temporal_peaks_see_the_same_page(crumpled, calibration):
     capture, _ = crumpled
     temporal = pipeline.decode(capture)
-    spatial = pipeline.decode(capture, sweep=SweepSettings(mode="spatial"))
+    spatial = pipeline.decode(capture, SweepSettings(mode="spatial"))
     both = (temporal.reason == 0) & (spatial.reason == 0)
     assert both.mean() > 0.5
     assert abs(np.median((spatial.column - temporal.column)[both])) < 0.02

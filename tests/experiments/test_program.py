@@ -39,7 +39,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("rig.colour=red", ("`rig.colour`", "noise_scale")),
         ("scan.ink=some", ("`scan.ink`", "true or false", "got some")),
         ("mesh.rows=1", ("`mesh.rows`", "[2, 1000]", "1")),
-        ("colour=red", ("`colour`", "one of budget, engine, experiment")),
+        ("colour=red", ("`colour`", "one of budget, decoders, engine, experiment")),
         ("+x=1", ("`x`", "existing key", "+x=1")),
         ("++seed=3", ("`seed`", "++seed=3")),
         ("~seed", ("`seed`", "~seed")),
@@ -52,14 +52,14 @@ ROOT = Path(__file__).resolve().parents[2]
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
         (
             "experiment=stiffness",
-            ("`experiment`", "corner_distance, fake, plane_accuracy, real_boards, textures", "'stiffness'"),
+            ("`experiment`", "corner_distance, decoders, fake, plane_accuracy, real_boards, textures", "'stiffness'"),
         ),
         ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
         ("trials", ("`trials`", "KEY=VALUE")),
         ("--nonsense", ("--nonsense", "KEY=VALUE")),
         ("out=/dev/null/x", ("`out`", "/dev/null/x")),
         (f"out=new/{'y' * 300}", ("`out`", "yyy", "too long")),
-        ("experiment=null", ("`experiment`", "corner_distance, fake", "got null")),
+        ("experiment=null", ("`experiment`", "corner_distance, decoders, fake", "got null")),
         ("experiment=1", ("`experiment`", "got 1")),
         ("experiment=[fake,fake]", ("`experiment`", "got [fake,fake]")),
         ("engine=null", ("`engine`", "processes, serial", "got null")),
@@ -212,7 +212,7 @@ def test_without_an_experiment_the_program_lists_them(capsys: pytest.CaptureFixt
     assert main([]) == 2
     error = capsys.readouterr().err
     assert error.splitlines() == [
-        "`experiment` must be one of corner_distance, plane_accuracy, real_boards, textures, got nothing."
+        "`experiment` must be one of corner_distance, decoders, plane_accuracy, real_boards, textures, got nothing."
     ]
 
 

@@ -18,8 +18,15 @@ from experiments.program import main
 SMALL = ["rig.board_poses=4", "mesh.rows=15", "mesh.columns=15", "trials=1", "engine=serial", "scan.mode=temporal"]
 CORNERS = {f"corner_{kind}_{unit}" for kind in ("mean", "rms", "max") for unit in ("px", "mm")}
 CORNERS |= {"corner_rigid_mean_mm", "corner_rigid_max_mm", "corners_missing", "corners_expected"}
-CALIBRATION = {f"calib_{name}_rms_px" for name in ("camera", "projector", "stereo")}
-DEPTH = {f"depth_raw_{name}_mm" for name in ("rms", "p95", "max")} | {"depth_coverage"}
+CALIBRATION = {
+    f"calib_{name}_rms_{unit}"
+    for names, unit in (
+        (("camera", "projector", "stereo", "held_out_camera", "held_out_projector"), "px"),
+        (("held_out_length",), "mm"),
+    )
+    for name in names
+}
+DEPTH = {f"depth_raw_{name}_mm" for name in ("rms", "p95", "max", "bias")} | {"depth_coverage"}
 SHEET = {"slope_p90_deg", "relief_mm"}
 
 

@@ -7,10 +7,14 @@ import numpy as np
 import pytest
 
 from deskew.io import write_capture
-from deskew.types import Array, Calibration, Capture, PatternKind, Pinhole
+from deskew.types import Array, Calibration, Capture, Fringe, PatternKind, Pinhole, n_frames
 
 CAMERA = (12, 8)
 PROJECTOR = (6, 5)
+FRINGES = {
+    PatternKind.GRAY_PHASE: (Fringe(4.0, 5),),
+    PatternKind.MULTI_PHASE: (Fringe(6.0, 4), Fringe(4.5, 6)),
+}
 
 
 def make_capture(
@@ -27,13 +31,11 @@ def make_capture(
         shape = (size[1], size[0], channels) if channels else (size[1], size[0])
         return rng.integers(0, np.iinfo(dtype).max, shape, dtype=dtype, endpoint=True)
 
-    if pattern is PatternKind.LINE_SWEEP:
-        counts = projector_size
-    else:
-        counts = (2 * (projector_size[0] - 1).bit_length(), 2 * (projector_size[1] - 1).bit_length())
+    fringes = FRINGES.get(pattern, ())
+    counts = tuple(n_frames(pattern, extent, fringes) for extent in projector_size)
     columns, rows = ([image() for _ in range(n)] for n in counts)
     textures = {light: image((31, 17)) for light in lights}
-    return Capture(image(), image(), projector_size, pattern, columns, rows, textures)
+    return Capture(image(), image(), projector_size, pattern, columns, rows, textures, fringes)
 
 
 @pytest.fixture

@@ -170,6 +170,7 @@ def test_a_capture_comes_back_as_it_was_written(
     write_capture(capture, tmp_path / "page")
     found = read_capture(tmp_path / "page")
     assert (found.pattern, found.projector_size, found.camera_size) == (pattern, (6, 5), (12, 8))
+    assert found.fringes == capture.fringes
     assert list(found.textures) == ["uv", "raking"]
     for ours, theirs in zip(everything(capture), everything(found), strict=True):
         assert ours.dtype == theirs.dtype
