@@ -21,9 +21,8 @@ def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) ->
     n_frames = len(frames)
     require(n_frames >= settings.window, name, f"hold at least {settings.window} frames, one window", n_frames)
     grey = read_frames(frames, scene.white, name)
-    if settings.mode == "temporal":
-        return decode_temporal(grey, n_frames, scene, settings)
-    return decode_spatial(grey, n_frames, scene, settings, along_rows=name == "columns")
+    reading = decode_temporal if settings.mode == "temporal" else decode_spatial
+    return reading(grey, n_frames, scene, settings, along_rows=name == "columns")
 
 
 def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Correspondence:

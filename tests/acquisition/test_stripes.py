@@ -157,7 +157,7 @@ def faulty_capture():
     amplitude, contrast = np.full(shape, 120.0), np.full(shape, 200.0)
     amplitude[PATCHES[Reason.SHADOW]], contrast[PATCHES[Reason.SHADOW]] = 0.0, 0.5
     amplitude[PATCHES[Reason.SATURATED]] = 330.0
-    amplitude[PATCHES[Reason.WEAK]] = 1.0
+    amplitude[PATCHES[Reason.WEAK]] = 0.4
     capture, column, row = stripe_capture(amplitude=amplitude, contrast=contrast)
     ghost = np.full(shape, np.nan)
     ghost[PATCHES[Reason.TWO_PEAKS]] = (column[PATCHES[Reason.TWO_PEAKS]] + 20) % 70
@@ -284,7 +284,7 @@ def test_a_dark_scene_is_a_failed_step_with_a_remedy():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"mode": "both"}, {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"half_width": 2.5},
+        {"mode": "both"}, {"guided_snr": 0.0}, {"guided_snr": 4.1}, {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"half_width": 2.5},
         {"min_snr": 0.0}, {"shadow_snr": -1.0}, {"second_peak_ratio": 0.0}, {"second_peak_ratio": 1.1},
         {"width_ratio": 1.0}, {"saturated_level": 0}, {"max_gap_px": 0.0},
     ],
