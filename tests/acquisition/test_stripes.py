@@ -284,7 +284,8 @@ def test_a_dark_scene_is_a_failed_step_with_a_remedy():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"mode": "both"}, {"guided_snr": 0.0}, {"guided_snr": 4.1}, {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"half_width": 2.5},
+        {"mode": "both"}, {"guided_snr": 0.0}, {"guided_snr": 4.1},
+        {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"half_width": 2.5},
         {"min_snr": 0.0}, {"shadow_snr": -1.0}, {"second_peak_ratio": 0.0}, {"second_peak_ratio": 1.1},
         {"width_ratio": 1.0}, {"saturated_level": 0}, {"max_gap_px": 0.0},
     ],
