@@ -20,7 +20,7 @@ from deskew.types import DepthMap, Floats
 _FEWEST = 6  # pixels that a plane is fitted to
 # Residuals [standard deviations] at which a pixel's weight has fallen to a quarter in a fit, to a half in the mean.
 _FIT_SCALE, _MEAN_SCALE = 2.0, 3.0
-_TOGETHER_SCALE = 2.0  # of the agreement of nine pixels together, a Gaussian in their mean's standard deviations
+_TOGETHER_SCALE = 3.0  # of the agreement of nine pixels together, a Gaussian in their mean's standard deviations
 _CLIP = 4.0  # larger residuals count as this among the nine: one wild pixel does not speak for all
 _RESIDUAL_MAX = 3.0  # larger residuals count as this in a window's misfit
 _MISFIT_OK = 1.3  # mean square residual that noise alone explains
