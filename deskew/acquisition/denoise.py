@@ -20,6 +20,8 @@ from deskew.types import DepthMap, Floats
 _FEWEST = 6  # pixels that a plane is fitted to
 # Residuals [standard deviations] at which a pixel's weight has fallen to a quarter in a fit, to a half in the mean.
 _FIT_SCALE, _MEAN_SCALE = 2.0, 3.0
+_TOGETHER_SCALE = 3.0  # of the agreement of nine pixels together, a Gaussian in their mean's standard deviations
+_CLIP = 4.0  # larger residuals count as this among the nine: one wild pixel does not speak for all
 _RESIDUAL_MAX = 3.0  # larger residuals count as this in a window's misfit
 _MISFIT_OK = 1.3  # mean square residual that noise alone explains
 _BIAS = 0.02  # error of a window's plane, squared, per unit of misfit beyond and noise variance
@@ -120,14 +122,43 @@ def _misfit(f: Floats, precision: Floats, y: int, x: int, radius: int, p: Floats
 
 
 @numba.njit(cache=True)
+def _residuals(f: Floats, precision: Floats, y: int, x: int, radius: int, p: Floats, out: Floats) -> None:
+    """Residuals from a window's plane in units of the noise, clipped, into `out` (2 radius + 3, 2 radius + 3).
+
+    The window with a rim of one pixel; 0 where nothing was measured.
+    """
+    height, width = f.shape
+    for i in range(y - radius - 1, y + radius + 2):
+        for j in range(x - radius - 1, x + radius + 2):
+            residual = 0.0
+            if 0 <= i < height and 0 <= j < width and precision[i, j] > 0.0:
+                residual = (f[i, j] - (p[0] + p[1] * (j - x) + p[2] * (i - y))) * np.sqrt(precision[i, j])
+            out[i - y + radius + 1, j - x + radius + 1] = min(max(residual, -_CLIP), _CLIP)
+
+
+@numba.njit(cache=True)
+def _contradiction(residuals: Floats, v: int, u: int) -> float:
+    """Squared mean residual of 3 x 3 pixels over its variance: about 1 on the plane, whatever the noise."""
+    total, n = 0.0, 0
+    for k in range(v - 1, v + 2):
+        for m in range(u - 1, u + 2):
+            total += residuals[k, m]
+            n += residuals[k, m] != 0.0
+    return total * total / max(n, 1)
+
+
+@numba.njit(cache=True)
 def _vote(
-    f: Floats, precision: Floats, y: int, x: int, radius: int, p: Floats, misfit: float, bias: float, sums: Floats
-) -> None:
+    f: Floats, precision: Floats, y: int, x: int, radius: int, p: Floats, misfit: float, bias: float,
+    residuals: Floats, sums: Floats,
+) -> None:  # fmt: skip
     """Add a window's predictions to `sums` (height, width, 2): weighted changes of each pixel, and weights.
 
     A weight is the inverse square of the prediction's expected squared error, variance and squared bias, times the
-    agreement of the pixel's own measurement.
+    agreement of what was measured at the pixel, and at it and its eight neighbours together: what one pixel may be by
+    noise, nine are not. `residuals` is scratch, as :func:`_residuals` fills it.
     """
+    _residuals(f, precision, y, x, radius, p, residuals)
     inflation = max(1.0, misfit)
     for i in range(max(0, y - radius), min(f.shape[0], y + radius + 1)):
         dy = float(i - y)
@@ -138,7 +169,8 @@ def _vote(
             dx = float(j - x)
             change = p[0] + p[1] * dx + p[2] * dy - f[i, j]
             variance = p[3] + 2.0 * (p[4] * dx + p[5] * dy + p[7] * dx * dy) + p[6] * dx * dx + p[8] * dy * dy
-            agreement = 1.0 / (1.0 + change * change * w / _MEAN_SCALE**2)
+            together = _contradiction(residuals, i - y + radius + 1, j - x + radius + 1)
+            agreement = np.exp(-0.5 * together / _TOGETHER_SCALE**2) / (1.0 + change * change * w / _MEAN_SCALE**2)
             weight = agreement / (inflation * variance + bias) ** 2
             sums[i, j, 0] += weight * change
             sums[i, j, 1] += weight
@@ -148,13 +180,15 @@ def _vote(
 def _vote_all(f: Floats, precision: Floats, radius: int, stride: int, n_reweightings: int, sums: Floats) -> None:
     """Fit and vote in every window of one size; their centres are `stride` apart."""
     m, p = np.zeros(9), np.zeros(9)
+    residuals = np.zeros((2 * radius + 3, 2 * radius + 3))
     for y in range((f.shape[0] - 1) % stride // 2, f.shape[0], stride):
         for x in range((f.shape[1] - 1) % stride // 2, f.shape[1], stride):
             if not _fit(f, precision, y, x, radius, n_reweightings, m, p):
                 continue
             misfit, variance = _misfit(f, precision, y, x, radius, p)
             if misfit < np.inf:
-                _vote(f, precision, y, x, radius, p, misfit, _BIAS * max(0.0, misfit - _MISFIT_OK) * variance, sums)
+                bias = _BIAS * max(0.0, misfit - _MISFIT_OK) * variance
+                _vote(f, precision, y, x, radius, p, misfit, bias, residuals, sums)
 
 
 def denoise_depth(depth: DepthMap, settings: DenoiseSettings | None = None) -> DepthMap:

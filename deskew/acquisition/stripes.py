@@ -26,11 +26,8 @@ def _decode(frames: Frames, name: str, scene: Scene, settings: SweepSettings) ->
     judged = light_to_judge(scene.white, scene.black, scene.saturated_level)
     watch = SweepWatch(judged, columns=along_rows)
     grey = map(watch.passing, read_frames(frames, scene.white, name))
-    if settings.mode == "temporal":
-        sweep = decode_temporal(grey, n_frames, scene, settings)
-    else:
-        sweep = decode_spatial(grey, n_frames, scene, settings, along_rows=along_rows)
-    return sweep, watch.check(name)
+    reading = decode_temporal if settings.mode == "temporal" else decode_spatial
+    return reading(grey, n_frames, scene, settings, along_rows=along_rows), watch.check(name)
 
 
 def decode_sweep(capture: Capture, settings: SweepSettings | None = None) -> Correspondence:

@@ -35,6 +35,9 @@ class SweepSettings:
     min_snr : float
         Smallest signal-to-noise ratio of a peak as a matched filter sees it, ``A sqrt(s sqrt(pi)) / noise``; the peak's
         position is then known to ``sqrt(2) s / snr``.
+    guided_snr : float
+        The same for a peak that stands where its neighbours' does, in (0, `min_snr`]: among so few samples noise hardly
+        rises as high.
     shadow_snr : float
         Smallest white - black of a lit pixel, in standard deviations of the dark noise.
     second_peak_ratio : float
@@ -51,6 +54,7 @@ class SweepSettings:
     peak: str = "gauss"
     half_width: int = 3
     min_snr: float = 4.0
+    guided_snr: float = 1.75
     shadow_snr: float = 5.0
     second_peak_ratio: float = 0.5
     width_ratio: float = 2.0
@@ -62,6 +66,7 @@ class SweepSettings:
         require(self.peak in ("gauss", "integer"), "peak", "be 'gauss' or 'integer'", repr(self.peak))
         require_whole("half_width", self.half_width, 2, 15)
         require_positive("min_snr", self.min_snr, 1e6)
+        require(0 < self.guided_snr <= self.min_snr, "guided_snr", f"be in (0, {self.min_snr}]", self.guided_snr)
         require_positive("shadow_snr", self.shadow_snr, 1e6)
         require(0 < self.second_peak_ratio <= 1, "second_peak_ratio", "be in (0, 1]", self.second_peak_ratio)
         require(self.width_ratio > 1, "width_ratio", "be above 1", self.width_ratio)
@@ -181,8 +186,9 @@ class Peaks:
 
 
 def measure(
-    profiles: Array, level: Floats, index: Array, n_samples: int, noise: float, settings: SweepSettings
-) -> Peaks:
+    profiles: Array, level: Floats, index: Array, n_samples: int, noise: float, settings: SweepSettings,
+    guided: npt.NDArray[np.bool_] | bool = False,
+) -> Peaks:  # fmt: skip
     """Fit every profile, and judge it by its amplitude and width.
 
     A strong peak's width is fitted with it; a weak one cannot measure its own, and takes the scene's.
@@ -195,9 +201,12 @@ def measure(
         Standard deviation of a sample [grey levels].
     settings : SweepSettings
         The thresholds.
+    guided : (n,) bool array
+        Peaks that stand where their neighbours' do.
     """
     position, amplitude, width = (np.zeros(len(index), np.float32) for _ in range(3))
-    fit_profiles(profiles, level, index, n_samples, 0.0, position, amplitude, width)
+    alone = np.where(guided, -1, index)
+    fit_profiles(profiles, level, alone, n_samples, 0.0, position, amplitude, width)
     reason = np.full(len(index), Reason.WEAK, np.uint8)
     # A high sample whose fit failed is no weak peak but no peak at all.
     high_sample = profiles[:, settings.half_width] - level >= _MEASURES_WIDTH * noise
@@ -210,7 +219,8 @@ def measure(
         weak = np.where(strong, -1, index)
         fit_profiles(profiles, level, weak, n_samples, typical, position, amplitude, width)
         # A wrong level looks like a low and wide peak: width beyond a stripe's earns no credit.
-        reason[matched_snr(amplitude, np.minimum(width, typical), noise) >= settings.min_snr] = Reason.OK
+        least = np.where(guided, settings.guided_snr, settings.min_snr)
+        reason[matched_snr(amplitude, np.minimum(width, typical), noise) >= least] = Reason.OK
         reason[strong & (width > settings.width_ratio * typical)] = Reason.TWO_PEAKS
         reason[strong & (width < typical / settings.width_ratio)] = Reason.WEAK
     reason[index < 0] = Reason.WEAK

@@ -7,15 +7,18 @@ interpolated between the neighbouring curves.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import chain
 
 import numba
 import numpy as np
+import numpy.typing as npt
 
 from deskew.acquisition.sweep import RIVAL_SNR, Scene, Sweep, SweepSettings, dark_level, dark_noise, measure, shadowed
+from deskew.acquisition.sweep_tracks import CELL, SMOOTH_NOISE, Cells, cells_of, sum_cells
 from deskew.types import Array, Floats, Reason
 
-_SMOOTH_NOISE = 6.0**0.5 / 4.0  # of the mean weighted by (1, 2, 1), relative to a sample's
+_SURELY_SEEN = 2.0  # times the height from which a stripe stands out
 _JUMP_LINES = 4  # missing curves leave smaller differences between neighbours
 _OK, _SATURATED, _WEAK, _TWO_PEAKS, _EDGE = (
     int(r) for r in (Reason.OK, Reason.SATURATED, Reason.WEAK, Reason.TWO_PEAKS, Reason.EDGE)
@@ -33,11 +36,14 @@ def _brightest(line: Floats, start: int, stop: int) -> tuple[int, float]:
 
 
 @numba.njit(cache=True)
-def _curve(frame: Array, level: Floats, half: int, index: Array, profiles: Array, heights: Floats) -> None:
+def _curve(
+    frame: Array, level: Floats, half: int, floor: float, guide: Array, index: Array, profiles: Array, heights: Floats
+) -> None:
     """Find one frame's stripe in each image line, where the line smoothed by (1, 2, 1) is highest.
 
     Fills index (lines,), profiles (lines, 2 half + 1) above the level, and heights (lines, 2): of the best peak and of
-    the next away from it, smoothed to a sum of weights of 1.
+    the next away from it, smoothed to a sum of weights of 1. Below the floor the peak is where the guide (lines,) says,
+    nowhere if that is negative.
     """
     n_lines, length = frame.shape
     line = np.empty(length, np.float32)
@@ -48,6 +54,8 @@ def _curve(frame: Array, level: Floats, half: int, index: Array, profiles: Array
         for x in range(1, length - 1):
             smooth[x] = np.float32(0.25) * (line[x - 1] + line[x] + line[x] + line[x + 1])
         at, heights[y, 0] = _brightest(smooth, 1, length - 1)
+        if heights[y, 0] < floor:
+            at = guide[y]
         index[y] = at
         if at < 0:
             continue
@@ -111,31 +119,86 @@ def _fill(
                 out[y, x] = which[i] + t * (which[i + 1] - which[i])
 
 
+@dataclass(frozen=True, slots=True)
+class _Pooled:
+    """The search in the light of `CELL` image lines together, (cells, length).
+
+    Attributes
+    ----------
+    cells : Cells
+        The lines' pixels.
+    level : (cells, length) array
+        Dark level of a cell.
+    half : int
+        Half-width of a profile.
+    floor : float
+        Least height of a cell's stripe [grey levels].
+    """
+
+    cells: Cells
+    level: Floats
+    half: int
+    floor: float
+
+    @classmethod
+    def of(cls, level: Floats, noise: float, settings: SweepSettings) -> _Pooled:
+        """Prepare for the dark level (lines, length) and the noise of a smoothed sample."""
+        cells = cells_of(level.shape, across=False)
+        total = np.zeros((len(cells.first) // level.shape[1], level.shape[1]), np.float32)
+        sum_cells(level, cells, total.reshape(-1))
+        return cls(cells, total, settings.half_width, settings.min_snr * noise * float(np.sqrt(CELL)))
+
+    def stripe(self, frame: Array) -> Array:
+        """Where each line's cell shows the stripe of a frame (lines, length), -1 where it does not: (lines,) int32."""
+        n = len(self.level)
+        sums, nowhere = np.empty(self.level.shape, np.uint32), np.full(n, -1, np.int32)
+        index, heights = np.empty(n, np.int32), np.zeros((n, 2), np.float32)
+        sum_cells(frame, self.cells, sums.reshape(-1))
+        profiles = np.empty((n, 2 * self.half + 1), np.float32)
+        _curve(sums, self.level, self.half, self.floor, nowhere, index, profiles, heights)
+        return np.repeat(index, CELL)[: len(frame)]
+
+
+def _too_bright(amplitude: Floats, contrast: Floats, seen: npt.NDArray[np.bool_], most: float) -> npt.NDArray[np.bool_]:
+    """Where a stripe would be higher than `most`, to judge by white - black and the stripes that are `seen`.
+
+    What is faint there is the tail of one that lies beyond a silhouette or the image.
+    """
+    ratio = float(np.median(amplitude[seen] / contrast[seen])) if seen.any() else 0.0
+    return np.asarray(ratio * contrast > most)
+
+
 def _observe(
     frames: Iterator[Array], n_frames: int, scene: Scene, settings: SweepSettings, along_rows: bool
 ) -> tuple[Floats, Array, float, float]:
     """Find every curve; return positions and states, (frames, lines), the dark noise and a stripe's typical width."""
     first = np.stack([next(frames) for _ in range(settings.window)])
     noise = dark_noise(first, scene)
-    level = dark_level(first, scene, noise)
+    level, contrast = dark_level(first, scene, noise), scene.contrast
     if not along_rows:
-        level = np.ascontiguousarray(level.T)
+        level, contrast = np.ascontiguousarray(level.T), np.ascontiguousarray(contrast.T)
     n_lines, length = level.shape
     index = np.full((n_frames, n_lines), -1, np.int32)
     profiles = np.zeros((n_frames, n_lines, settings.window), np.float32)
     heights = np.zeros((n_frames, n_lines, 2), np.float32)
     clipped = np.zeros((n_frames, n_lines), np.bool_)
+    floor = RIVAL_SNR * SMOOTH_NOISE * noise
+    pooled = _Pooled.of(level, SMOOTH_NOISE * noise, settings)
     for k, frame in enumerate(chain(first, frames)):
         turned = frame if along_rows else np.ascontiguousarray(frame.T)
-        _curve(turned, level, settings.half_width, index[k], profiles[k], heights[k])
+        guide = pooled.stripe(turned)
+        _curve(turned, level, settings.half_width, floor, guide, index[k], profiles[k], heights[k])
         clipped[k] = turned[np.arange(n_lines), index[k]] >= scene.saturated_level
-    peaks = measure(
-        profiles.reshape(-1, settings.window), np.zeros(index.size, np.float32), index.ravel(), length, noise, settings
-    )
+    guided = heights[..., 0] < floor
+    none = np.zeros(index.size, np.float32)
+    peaks = measure(profiles.reshape(-1, settings.window), none, index.ravel(), length, noise, settings, guided.ravel())
     state = peaks.reason.reshape(index.shape)
     best, second = heights[..., 0], heights[..., 1]
-    rival = np.maximum(settings.second_peak_ratio * best, RIVAL_SNR * _SMOOTH_NOISE * noise)
+    rival = np.maximum(settings.second_peak_ratio * best, floor)
     state[(state == Reason.OK) & (second > rival)] = Reason.TWO_PEAKS
+    paper = contrast[np.arange(n_lines), index]
+    seen = (state == Reason.OK) & ~guided & (paper > 0)
+    state[guided & _too_bright(peaks.amplitude.reshape(index.shape), paper, seen, _SURELY_SEEN * floor)] = Reason.WEAK
     state[clipped & (index >= 0)] = Reason.SATURATED
     position = peaks.position.reshape(index.shape)
     return np.where(clipped, index, position).astype(np.float32), state, noise, peaks.typical_width

@@ -91,6 +91,24 @@ def test_a_step_is_not_smeared():
     assert np.abs(off).max() < 0.25  # a mean across the step is off by a millimetre
 
 
+@pytest.mark.parametrize("turn_deg", [30.0, 40.0])
+def test_no_plane_is_carried_from_white_paper_across_a_crease_in_ink(turn_deg):
+    """A pixel of ink beyond the crease may be off by its noise; nine of them may not."""
+    slope = np.tan(np.radians(turn_deg) / 2)
+    true = np.maximum(plane(slope, 0.0), plane(-slope, 0.0))
+    level = np.where(X < (WIDTH - 1) / 2 - 3, 0.02, 0.3)
+    off = np.stack([denoise_depth(depth_of(true + noise(level, seed))).z - true for seed in range(3)])[:, 8:-8, 8:-8]
+    assert 0.02 < np.abs(off.mean(axis=1)).max() < 0.25  # of a column
+    assert 0.1 < np.abs(off).max() < 0.6
+
+
+def test_a_facet_narrower_than_every_window_but_one_is_kept():
+    steps = np.select([X < 78, X < 82], [0.15, -0.18], 0.2)
+    true = DISTANCE + np.cumsum(steps, axis=1) - 12.0
+    off = denoise_depth(depth_of(true + noise(0.02))).z - true
+    assert 0.005 < np.abs(off[INNER]).max() < 0.04
+
+
 def test_missing_pixels_stay_missing_for_the_same_reason():
     z = plane(0.1, 0.3) + noise(0.05)
     z[40:60, 30:80] = np.nan

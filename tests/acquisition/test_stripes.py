@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from deskew.acquisition.grey import grey_levels
 from deskew.acquisition.peaks import fit_gaussian
 from deskew.acquisition.stripes import SweepSettings, decode_sweep
+from deskew.acquisition.sweep_tracks import cells_of, sum_cells
 from deskew.errors import InputError, StepError
 from deskew.types import Capture, PatternKind, Reason
 from tests.acquisition.stripe_scenes import StripeFrames, stripe_capture
@@ -157,7 +158,7 @@ def faulty_capture():
     amplitude, contrast = np.full(shape, 120.0), np.full(shape, 200.0)
     amplitude[PATCHES[Reason.SHADOW]], contrast[PATCHES[Reason.SHADOW]] = 0.0, 0.5
     amplitude[PATCHES[Reason.SATURATED]] = 330.0
-    amplitude[PATCHES[Reason.WEAK]] = 1.0
+    amplitude[PATCHES[Reason.WEAK]] = 0.4
     capture, column, row = stripe_capture(amplitude=amplitude, contrast=contrast)
     ghost = np.full(shape, np.nan)
     ghost[PATCHES[Reason.TWO_PEAKS]] = (column[PATCHES[Reason.TWO_PEAKS]] + 20) % 70
@@ -224,6 +225,57 @@ def test_a_stripe_on_the_border_of_the_projector_is_no_peak():
     assert (decoded.reason[:, 40:] == Reason.OK).all()
 
 
+def inked_capture(amplitude, noise):
+    """Paper, and from the ninth column on ink of the given amplitude; white - black as the stripes add up to."""
+    amplitudes = np.full((120, 160), amplitude)
+    amplitudes[:, :8] = 40.0
+    contrast = amplitudes * 1.2 * np.sqrt(2 * np.pi)
+    return stripe_capture((160, 120), (200, 150), amplitude=amplitudes, contrast=contrast, noise=noise, seed=7)
+
+
+@pytest.mark.parametrize("mode", ["temporal", "spatial"])
+def test_ink_too_dark_for_one_pixel_is_read_where_its_neighbours_light_shows_the_stripe(mode):
+    noise = 1.8
+    amplitude = 4.2 * noise / np.sqrt(1.2 * np.sqrt(np.pi))  # a signal-to-noise ratio of 4.2 before rounding
+    capture, column, row = inked_capture(amplitude, noise)
+    ink = np.s_[4:-4, 12:-4]
+    alone = decode_sweep(capture, SweepSettings(mode=mode, guided_snr=4.0)).reason[ink] == Reason.OK
+    decoded = decode_sweep(capture, SweepSettings(mode=mode))
+    ok = decoded.reason[ink] == Reason.OK
+    assert 0.1 < alone.mean() < 0.75
+    assert 0.93 < ok.mean() < 1.0
+    bound = bound_px(amplitude, 1.2, noise)
+    for found, truth in ((decoded.column, column), (decoded.row, row)):
+        error = (found - truth)[ink][ok]
+        # Wild peaks, anywhere in the sweep, would make this ten times the bound.
+        assert 0.9 < error.std() / bound < 1.1
+        assert np.abs(error).max() < 3.0
+        assert abs(error.mean()) < 0.1 * bound
+
+
+@pytest.mark.parametrize("mode", ["temporal", "spatial"])
+def test_four_pixels_together_see_no_stripe_in_noise(mode):
+    capture, _, _ = inked_capture(0.0, 1.8)
+    assert (decode_sweep(capture, SweepSettings(mode=mode)).reason[:, 12:] == Reason.OK).mean() < 0.005
+
+
+@pytest.mark.parametrize("shape", [(13, 18), (16, 12)])
+@pytest.mark.parametrize("across", [False, True])
+def test_cells_cover_the_image_and_their_sums_are_those_of_their_pixels(shape, across):
+    frame = np.random.default_rng(2).integers(0, 256, shape).astype(np.uint8)
+    cells = cells_of(shape, across=across)
+    places = cells.first[:, None] + cells.step * np.arange(cells.size)
+    assert set(places.ravel()) == set(range(frame.size))
+    total = np.zeros(len(cells.first), np.uint16)
+    sum_cells(frame, cells, total)
+    np.testing.assert_array_equal(total, frame.ravel()[places].sum(axis=1))
+
+
+def test_an_image_narrower_than_a_cell_is_refused():
+    with pytest.raises(InputError, match="`white` must be at least 4 px wide and high"):
+        decode_sweep(stripe_capture((12, 3), (16, 30))[0])
+
+
 @pytest.mark.parametrize("noise", [0.0, 1.0, 3.0])
 def test_noise_alone_is_hardly_ever_taken_for_a_stripe(noise):
     amplitude = np.zeros((64, 96))
@@ -284,7 +336,8 @@ def test_a_dark_scene_is_a_failed_step_with_a_remedy():
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"mode": "both"}, {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"half_width": 2.5},
+        {"mode": "both"}, {"guided_snr": 0.0}, {"guided_snr": 4.1},
+        {"peak": "parabola"}, {"half_width": 1}, {"half_width": 16}, {"half_width": 2.5},
         {"min_snr": 0.0}, {"shadow_snr": -1.0}, {"second_peak_ratio": 0.0}, {"second_peak_ratio": 1.1},
         {"width_ratio": 1.0}, {"saturated_level": 0}, {"max_gap_px": 0.0},
     ],
