@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         ProjectorCheck,
         Restoration,
         Scan,
+        Sheet,
     )
 
 app = typer.Typer(
@@ -250,7 +251,12 @@ def scan(
         texture[..., 1] = 1.0 - texture[..., 1]
         io.write_mesh(io.sheet_mesh(found.sheet, texture), output)
     figures = {"scan": str(output), "vertices": found.sheet.vertices[..., 0].size, **_depth_figures(found.depth)}
+    figures |= {"filled_fraction": found.filled_fraction, "cut_quads": _cut_quads(found.sheet)}
     _report(figures | _projector_figures(found.projector), as_json, output)
+
+
+def _cut_quads(sheet: Sheet) -> int:
+    return 0 if sheet.cut is None else int(sheet.cut.sum())
 
 
 @app.command()

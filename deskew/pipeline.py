@@ -140,7 +140,14 @@ def span(
         outline = acquisition.page_outline(capture.white, capture.black, calibration.camera, mask, depth_map)
     mesh = acquisition.page_mesh(depth_map, outline, shape, max_hole_px=max_hole_px)
     images = {WHITE: capture.white, **capture.textures}
-    return Scan(images, depth_map, calibration.camera, mesh.sheet, outline.corners)
+    return Scan(
+        images,
+        depth_map,
+        calibration.camera,
+        mesh.sheet,
+        outline.corners,
+        filled_fraction=mesh.filled_fraction,
+    )
 
 
 def restore(

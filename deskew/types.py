@@ -394,11 +394,14 @@ class Sheet:
         Triangles; None for a grid.
     stiffness : (R - 1, C - 1) array or None
         Spring constant k_s of each quad of a grid [kg/s^2]; None for the method's own uniform value.
+    cut : (R - 1, C - 1) bool array or None
+        Quads of a grid across which the surface breaks off: nothing joins their sides. None for a sheet in one piece.
     """
 
     vertices: Floats
     faces: npt.NDArray[np.integer[Any]] | None = None
     stiffness: Floats | None = None
+    cut: npt.NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         _require_numbers("vertices", self.vertices, "fiu")
@@ -438,6 +441,11 @@ class Sheet:
                 "be positive and finite [kg/s^2]",
                 f"a minimum of {np.min(self.stiffness)}",
             )
+        if self.cut is not None:
+            shape = (vertices.shape[0] - 1, vertices.shape[1] - 1)
+            sound = self.faces is None and self.cut.shape == shape and self.cut.dtype == np.bool_
+            require(sound, "cut", f"be bool of shape {shape}, one value a quad of a grid", self.cut.shape)
+            require(not self.cut.all(), "cut", "leave a quad whole", "every quad cut")
 
 
 class Status(StrEnum):
@@ -491,6 +499,8 @@ class Scan:
         row's last and first.
     projector : ProjectorCheck
         What the capture's frames say about the projector; a file does not keep it.
+    filled_fraction : float
+        Share of the sheet's inner vertices whose depth was not measured but carried over from the surroundings.
     """
 
     images: Mapping[str, Array]
@@ -499,6 +509,7 @@ class Scan:
     sheet: Sheet
     outline: Floats
     projector: ProjectorCheck = ProjectorCheck()
+    filled_fraction: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

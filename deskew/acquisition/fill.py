@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from deskew.acquisition.jumps import depth_jumps
 from deskew.acquisition.outline import Outline
 from deskew.errors import StepError, require
 from deskew.types import DepthMap, Floats
@@ -38,11 +39,14 @@ class FilledDepth:
         True where the depth map itself speaks; elsewhere the value is carried over from the surroundings.
     inside : (height, width) bool array
         The page without its rim.
+    jump : (height, width) bool array
+        Pixels beside a jump of the depth: nothing may be interpolated across them.
     """
 
     inverse_z: Floats
     measured: npt.NDArray[np.bool_]
     inside: npt.NDArray[np.bool_]
+    jump: npt.NDArray[np.bool_]
 
 
 def fill_depth(depth: DepthMap, outline: Outline, max_hole_px: float) -> FilledDepth:
@@ -75,8 +79,11 @@ def fill_depth(depth: DepthMap, outline: Outline, max_hole_px: float) -> FilledD
     wanted = cv2.dilate(page, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * BEYOND_PX + 1,) * 2)).astype(bool)
     _require_small_holes(measured, page.astype(bool), max_hole_px)
     inverse = np.where(measured, 1.0 / np.where(measured, depth.z, 1.0), np.nan)
+    jump = depth_jumps(np.where(measured, depth.z, np.nan), page.astype(bool), float(depth.camera.K[0, 0]))
     # The reach beyond the outline comes on top of the largest hole.
     missing = wanted & ~measured
+    torn = missing & _near(jump)
+    missing &= ~torn  # no plane belongs to both sides of a jump
     for sigma in (*WINDOWS_PX, 16.0):
         if not missing.any():
             break
@@ -84,10 +91,18 @@ def fill_depth(depth: DepthMap, outline: Outline, max_hole_px: float) -> FilledD
         good = missing & (support >= SUPPORT_MIN)
         inverse[good] = plane[good]
         missing &= ~good
+    missing |= torn
     if missing.any():
         nearest = ndimage.distance_transform_edt(~np.isfinite(inverse), return_distances=False, return_indices=True)
         inverse[missing] = inverse[tuple(nearest[:, missing])]
-    return FilledDepth(inverse, measured, inside)
+    return FilledDepth(inverse, measured, inside, jump)
+
+
+def _near(jump: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Pixels within a middling window of a jump."""
+    if not jump.any():
+        return jump
+    return np.asarray(ndimage.distance_transform_edt(~jump) <= 2 * WINDOWS_PX[1])
 
 
 def _polygon_mask(ring: Floats, shape: tuple[int, ...]) -> npt.NDArray[np.uint8]:

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from deskew import projection
 from deskew.acquisition.fill import FilledDepth, fill_depth
@@ -43,7 +45,8 @@ def page_mesh(
     """Span a grid over the page and lift it into space by the depth map.
 
     The grid is a Coons patch: nodes on each side at even lengths in space, those inside blended from the four sides.
-    So it reaches the page's outline everywhere, as a grid over the bounding box does not.
+    So it reaches the page's outline everywhere, as a grid over the bounding box does not. Where the depth jumps, as
+    beside a flap that hides a part of the page, the quads across the jump are cut.
 
     Parameters
     ----------
@@ -65,7 +68,7 @@ def page_mesh(
     InputError
         If the mesh is smaller than 2 x 2 or larger than 1000 x 1000.
     StepError
-        If a hole is too large, or the outline is so concave that the grid overlaps itself.
+        If a hole is too large, the outline is so concave that the grid overlaps itself, or the depth jumps everywhere.
     """
     sound = isinstance(shape, Sequence) and len(shape) == 2 and all(is_whole(n, 2, 1000) for n in shape)
     require(sound, "shape", "be (rows, columns) of at least 2 x 2 vertices, at most 1000 x 1000", shape)
@@ -78,7 +81,7 @@ def page_mesh(
     nodes = coons_grid(top, right, bottom, left)
     _require_unfolded(nodes)
     vertices = _lift(nodes, filled, depth.camera)
-    return PageMesh(Sheet(vertices), nodes, _filled_fraction(nodes, filled))
+    return PageMesh(Sheet(vertices, cut=_cut_quads(nodes, filled)), nodes, _filled_fraction(nodes, filled))
 
 
 def page_sheet(
@@ -112,9 +115,13 @@ def coons_grid(top: Floats, right: Floats, bottom: Floats, left: Floats) -> Floa
 
 
 def _lift(pixels: Floats, filled: FilledDepth, camera: Pinhole) -> Floats:
-    """World points [mm] of pixels on the page; the inverse depth is bilinear between pixels."""
+    """World points [mm] of pixels on the page; the inverse depth is bilinear between pixels, but not across a jump."""
     places = [pixels[..., 1], pixels[..., 0]]
     inverse = ndimage.map_coordinates(filled.inverse_z, places, order=1, mode="nearest")
+    if filled.jump.any():
+        torn = ndimage.map_coordinates(filled.jump.astype(np.float64), places, order=1, mode="nearest") > 0
+        nearest = ndimage.map_coordinates(filled.inverse_z, places, order=0, mode="nearest")
+        inverse = np.where(torn, nearest, inverse)
     return np.asarray(projection.centre(camera) + projection.rays(camera, pixels) / inverse[..., None])
 
 
@@ -140,6 +147,20 @@ def _require_unfolded(nodes: Floats) -> None:
             f"Page mesh: {folded} of {down.shape[0] * down.shape[1]} quads overlap, the outline is too concave for a "
             "grid between its four sides; give a mask of a simpler outline."
         )
+
+
+def _cut_quads(nodes: Floats, filled: FilledDepth) -> npt.NDArray[np.bool_] | None:
+    """Quads that hold a jump, (R - 1, C - 1), each jump's pixels going to the quad with the nearest middle."""
+    if not filled.jump.any():
+        return None
+    rows, columns = nodes.shape[0] - 1, nodes.shape[1] - 1
+    middles = (nodes[:-1, :-1] + nodes[:-1, 1:] + nodes[1:, :-1] + nodes[1:, 1:]).reshape(-1, 2) / 4
+    y, x = np.nonzero(filled.jump)
+    cut = np.zeros(rows * columns, dtype=bool)
+    cut[cKDTree(middles).query(np.stack([x, y], axis=-1))[1]] = True
+    if cut.all():
+        raise StepError("Page mesh: the depth jumps in every quad; use more vertices, or scan the page again.")
+    return cut.reshape(rows, columns)
 
 
 def _filled_fraction(nodes: Floats, filled: FilledDepth) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from deskew.errors import require
 from deskew.flattening.contact import Plane
@@ -71,8 +72,11 @@ class Constants:
     dt_floor: float
 
 
-def folded_quads(xy: Floats) -> int:
-    """Count the quads of an (R, C, 2) grid that are turned over or not convex, against the way most of it lies."""
+def folded_quads(xy: Floats, cut: npt.NDArray[np.bool_] | None = None) -> int:
+    """Count the quads of an (R, C, 2) grid that are turned over or not convex, against the way most of it lies.
+
+    Quads that are `cut`, (R - 1, C - 1), are none of the sheet and do not count.
+    """
     along, down = np.diff(xy, axis=1), np.diff(xy, axis=0)
     corners = np.stack(
         [
@@ -81,6 +85,8 @@ def folded_quads(xy: Floats) -> int:
             for b in (down[:, :-1], down[:, 1:])
         ]
     )
+    if cut is not None:
+        corners = corners[:, ~cut]
     return int((corners * np.sign(corners.sum()) <= 0).any(axis=0).sum())
 
 
@@ -188,7 +194,7 @@ def _run_to_rest(
 def _outcome(run: Run, springs: Springs, plane: Plane, still: bool) -> tuple[Status, str]:
     """Name what a sheet that moves no more, or ran out of steps, has come to."""
     z = float(run.x[2].max())
-    folded = folded_quads(run.x[:2].T.reshape(*springs.grid, 2))
+    folded = folded_quads(run.x[:2].T.reshape(*springs.grid, 2), springs.cut)
     if folded and (still or z < plane.eps):
         return Status.FOLDED, _REMEDY[Status.FOLDED].format(folded=folded)
     if not still and plane.literal and run.counts[REJECTED] > 0:
@@ -207,7 +213,7 @@ def _counters(run: Run, springs: Springs, constants: Constants) -> dict[str, flo
         "steps_rejected": float(run.counts[REJECTED]),
         "force_evaluations": float(run.counts[EVALUATIONS]),
         "contacts": float(run.counts[CONTACTS]),
-        "folded_quads": float(folded_quads(run.x[:2].T.reshape(*springs.grid, 2))),
+        "folded_quads": float(folded_quads(run.x[:2].T.reshape(*springs.grid, 2), springs.cut)),
         "spring_energy": float(spring_energy(run.x, physics)),
         "kinetic_energy": 0.5 * physics.mass * float((run.v**2).sum()),
         "height_max_mm": float(run.x[2].max()),

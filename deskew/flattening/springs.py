@@ -54,6 +54,11 @@ class Springs:
         return float(self.k_s.max())
 
     @property
+    def cut(self) -> npt.NDArray[np.bool_]:
+        """Quads without shear springs, (R - 1, C - 1): the sheet is cut there."""
+        return np.asarray(self.k_s[2, :-1, :-1] == 0)
+
+    @property
     def rest_mean(self) -> float:
         """Mean rest length of the structural springs [mm]."""
         structural = self.rest[:2]
@@ -114,7 +119,9 @@ def chord_lengths(vertices: Floats) -> Floats:
     return lengths
 
 
-def spring_constants(grid: tuple[int, int], k_s: float, quads: Floats | None = None) -> Floats:
+def spring_constants(
+    grid: tuple[int, int], k_s: float, quads: Floats | None = None, cut: npt.NDArray[np.bool_] | None = None
+) -> Floats:
     """Spread a spring constant, or one constant a quad, over the springs of a grid.
 
     Parameters
@@ -126,6 +133,8 @@ def spring_constants(grid: tuple[int, int], k_s: float, quads: Floats | None = N
     quads : (R - 1, C - 1) array or None
         Constant of each quad [kg/s^2]: its shear springs take it, a structural spring takes the mean of the quads
         that it borders.
+    cut : (R - 1, C - 1) bool array or None
+        Quads without shear springs; a structural spring between two of them, or between one and nothing, is none.
 
     Returns
     -------
@@ -138,11 +147,16 @@ def spring_constants(grid: tuple[int, int], k_s: float, quads: Floats | None = N
         constants[0, :, : columns - 1] = k_s
         constants[1, : rows - 1, :] = k_s
         constants[2:, : rows - 1, : columns - 1] = k_s
-        return constants
-    padded = np.pad(quads, 1, mode="edge")
-    constants[0, :, : columns - 1] = (padded[:-1, 1:-1] + padded[1:, 1:-1]) / 2
-    constants[1, : rows - 1, :] = (padded[1:-1, :-1] + padded[1:-1, 1:]) / 2
-    constants[2:, : rows - 1, : columns - 1] = quads
+    else:
+        padded = np.pad(quads, 1, mode="edge")
+        constants[0, :, : columns - 1] = (padded[:-1, 1:-1] + padded[1:, 1:-1]) / 2
+        constants[1, : rows - 1, :] = (padded[1:-1, :-1] + padded[1:-1, 1:]) / 2
+        constants[2:, : rows - 1, : columns - 1] = quads
+    if cut is not None:
+        whole = np.pad(~cut, 1, constant_values=False)
+        constants[0, :, : columns - 1] *= whole[:-1, 1:-1] | whole[1:, 1:-1]
+        constants[1, : rows - 1, :] *= whole[1:-1, :-1] | whole[1:-1, 1:]
+        constants[2:, : rows - 1, : columns - 1] *= ~cut
     return constants
 
 
@@ -175,7 +189,8 @@ def chord_springs(sheet: Sheet, k_s: float) -> Springs:
         sound = low >= SMALLEST and high <= LARGEST
         require(sound, "stiffness", f"be in [{SMALLEST:g}, {LARGEST:g}] [kg/s^2]", f"{low:g} to {high:g}")
     rest = chord_lengths(sheet.vertices)
-    constants = spring_constants((rows, columns), k_s, sheet.stiffness)
+    constants = spring_constants((rows, columns), k_s, sheet.stiffness, sheet.cut)
+    rest[constants == 0] = 0.0
     coincident = int(((rest < SHORTEST_MM) & (constants > 0)).sum())
     require(coincident == 0, "vertices", "be distinct along every edge and diagonal", f"{coincident} coincident pairs")
     return Springs(rest, constants)

@@ -69,7 +69,7 @@ def grid_faces(n_rows: int, n_columns: int) -> Faces:
 
 
 def sheet_mesh(sheet: Sheet, texture: Floats | None = None) -> Mesh:
-    """Return a sheet as triangles, a grid's vertices row by row.
+    """Return a sheet as triangles, a grid's vertices row by row; quads that are cut have none.
 
     Parameters
     ----------
@@ -79,6 +79,8 @@ def sheet_mesh(sheet: Sheet, texture: Floats | None = None) -> Mesh:
         Texture coordinates in the layout of the sheet's vertices.
     """
     faces = grid_faces(*sheet.vertices.shape[:2]) if sheet.faces is None else sheet.faces.astype(np.int64)
+    if sheet.cut is not None:
+        faces = faces.reshape(-1, 2, 3)[~sheet.cut.ravel()].reshape(-1, 3)
     flat = None if texture is None else np.asarray(texture, dtype=np.float64).reshape(-1, 2)
     return Mesh(sheet.vertices.reshape(-1, 3), faces, flat)
 

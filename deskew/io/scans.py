@@ -28,6 +28,7 @@ _SCAN: dict[str, tuple[int | None, ...]] = {
     **{f"camera_{name}": shape for name, shape in _PINHOLE.items()},
     "sheet_vertices": (None, None, 3),
     "outline": (4, 2),
+    "filled_fraction": (),
 }
 
 
@@ -138,9 +139,12 @@ def write_scan(scan: Scan, path: Path) -> None:
         **_pinhole_arrays(scan.camera, "camera"),
         "sheet_vertices": scan.sheet.vertices,
         "outline": np.asarray(scan.outline),
+        "filled_fraction": np.array(scan.filled_fraction),
     }
     if scan.sheet.stiffness is not None:
         arrays["sheet_stiffness"] = scan.sheet.stiffness
+    if scan.sheet.cut is not None:
+        arrays["sheet_cut"] = scan.sheet.cut
     write_arrays(arrays, Path(path))
 
 
@@ -165,7 +169,9 @@ def read_scan(path: Path) -> Scan:
         require(white == camera.size, "image_white", f"have the camera's size {camera.size}", white)
         outline = arrays["outline"]
         require(bool(np.isfinite(outline).all()), "outline", "be finite", "NaN or infinity")
-        sheet = Sheet(arrays["sheet_vertices"], stiffness=arrays.get("sheet_stiffness"))
-        return Scan(images, _depth(arrays, path), camera, sheet, outline)
+        sheet = Sheet(arrays["sheet_vertices"], stiffness=arrays.get("sheet_stiffness"), cut=arrays.get("sheet_cut"))
+        filled = float(arrays["filled_fraction"])
+        require(0 <= filled <= 1, "filled_fraction", "be in [0, 1]", filled)
+        return Scan(images, _depth(arrays, path), camera, sheet, outline, filled_fraction=filled)
     except InputError as error:
         raise _named(error, path) from error

@@ -25,21 +25,22 @@ def _corner_triangles(rows: int, columns: int) -> Triangles:
     return np.stack([np.stack(t, axis=-1) for t in ((d, a, b), (a, b, c), (b, c, d), (c, d, a))], axis=1)
 
 
+def _quad_triangles(sheet: Sheet) -> Triangles:
+    """Corner triangles of a grid's quads that are not cut, (Q, 4, 3)."""
+    corners = _corner_triangles(*sheet.vertices.shape[:2])
+    return corners if sheet.cut is None else corners[~sheet.cut.ravel()]
+
+
 def _triangles(sheet: Sheet) -> Triangles:
     if sheet.faces is not None:
         return sheet.faces
-    corners = _corner_triangles(*sheet.vertices.shape[:2])
     # Corner triangles 1 (a, b, c) and 3 (c, d, a) are the two halves of the quad.
-    return corners[:, [1, 3]].reshape(-1, 3)
+    return _quad_triangles(sheet)[:, [1, 3]].reshape(-1, 3)
 
 
 def _edges(sheet: Sheet) -> Triangles:
     """All edges once, (E, 2); of a grid its structural edges and both diagonals of each quad (section 3.2.2)."""
-    if sheet.faces is None:
-        rows, columns = sheet.vertices.shape[:2]
-        triangles = _corner_triangles(rows, columns).reshape(-1, 3)
-    else:
-        triangles = sheet.faces
+    triangles = _quad_triangles(sheet).reshape(-1, 3) if sheet.faces is None else sheet.faces
     pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     return np.unique(np.sort(pairs, axis=1), axis=0)
 
@@ -83,7 +84,7 @@ def sheet_strain(sheet: Sheet, flattened: Flattened) -> dict[str, float]:
         "flips": float((up * _signed_areas(after, triangles) <= 0).sum()),
     }
     if sheet.faces is None:
-        areas = up * _signed_areas(after, _corner_triangles(shape[0], shape[1]))
+        areas = up * _signed_areas(after, _quad_triangles(sheet))
         figures["folded_quads"] = float((areas <= 0).any(axis=1).sum())
     return figures
 

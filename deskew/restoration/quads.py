@@ -8,6 +8,7 @@ has, is drawn as two triangles.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from deskew.types import Floats, Size
@@ -141,7 +142,7 @@ def _load(grid: Floats, i: int, j: int, q: Floats) -> None:
 
 
 @njit(cache=True)
-def _draw_all(new: Floats, old: Floats, main_sign: float, out: Floats) -> None:
+def _draw_all(new: Floats, old: Floats, cut: npt.NDArray[np.bool_], main_sign: float, out: Floats) -> None:
     """Folded quads first, so that the sound ones around them lie on top; then the ring around the page."""
     rows, columns = new.shape[0] - 1, new.shape[1] - 1
     q, s, slack = np.empty((4, 2)), np.empty((4, 2)), np.empty(4)
@@ -149,7 +150,7 @@ def _draw_all(new: Floats, old: Floats, main_sign: float, out: Floats) -> None:
         slack[:] = EDGE_TOLERANCE_PX if stage < 2 else RING_PX
         for i in range(rows):
             for j in range(columns):
-                if stage == 2 and 0 < i < rows - 1 and 0 < j < columns - 1:
+                if cut[i, j] or (stage == 2 and 0 < i < rows - 1 and 0 < j < columns - 1):
                     continue
                 _load(new, i, j, q)
                 sign = _orientation(q)
@@ -162,7 +163,7 @@ def _draw_all(new: Floats, old: Floats, main_sign: float, out: Floats) -> None:
                     _draw_convex(q, s, sign, slack, stage == 2, out)
 
 
-def backward_quads(new: Floats, old: Floats, size: Size) -> Floats:
+def backward_quads(new: Floats, old: Floats, size: Size, cut: npt.NDArray[np.bool_] | None = None) -> Floats:
     """Return for each pixel of the restored view the old place of what is there now.
 
     Parameters
@@ -171,6 +172,8 @@ def backward_quads(new: Floats, old: Floats, size: Size) -> Floats:
         The mesh's vertices in the restored view (u', v') and in the undistorted image (u, v) [px].
     size : (width, height)
         Of the restored view.
+    cut : (R - 1, C - 1) bool array or None
+        Quads that are not drawn: there is no surface between their corners.
 
     Returns
     -------
@@ -183,6 +186,7 @@ def backward_quads(new: Floats, old: Floats, size: Size) -> Floats:
     _draw_all(
         np.ascontiguousarray(new, dtype=np.float64),
         np.ascontiguousarray(old, dtype=np.float64),
+        np.zeros((new.shape[0] - 1, new.shape[1] - 1), dtype=np.bool_) if cut is None else cut,
         1.0 if total >= 0 else -1.0,
         out,
     )

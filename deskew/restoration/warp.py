@@ -120,7 +120,7 @@ def texture_quads(image: Array, camera: Pinhole, sheet: Sheet, flattened: Flatte
     require(finite, "flattened", "have finite vertices", f"status {Status(flattened.status)} with NaN or infinity")
     view, ideal = view_camera(camera, scale), projection.ideal(camera)
     new = _pixels(view, flattened.vertices, "flattened")
-    source = backward_quads(new, _pixels(ideal, sheet.vertices, "sheet"), view.size)
+    source = backward_quads(new, _pixels(ideal, sheet.vertices, "sheet"), view.size, sheet.cut)
     backward = _through_lens(camera, ideal, source)
     if not np.isfinite(backward[..., 0]).any():
         raise StepError(

@@ -69,6 +69,8 @@ class CornerDistance(Study):
             Column("depth_raw_rms_mm", "depth RMS [mm]", 3),
             Column("depth_rms_mm", "filtered depth RMS [mm]", 3),
             Column("depth_coverage", "depth coverage", 4),
+            Column("mesh_filled_fraction", "mesh filled", 4),
+            Column("mesh_cut_quads", "quads cut", 0),
         ),
         (
             Plot("corner_mean_px", "corner_mean_px", "mean corner distance, affine-aligned [px]", _PAPER_PX),
@@ -175,6 +177,8 @@ class _Trial:
                 self._fail("restored", method, error)
             return None
         self._measure_depth(raw, scan.depth)
+        cut = 0.0 if scan.sheet.cut is None else float(scan.sheet.cut.sum())
+        self.record.add("unrestored", "-", {"mesh_filled_fraction": scan.filled_fraction, "mesh_cut_quads": cut})
         self._picture("model", model_view(scan.sheet.vertices))
         return scan
 

@@ -169,3 +169,46 @@ def test_outline_too_concave_for_a_grid_is_a_failed_step() -> None:
 def test_hole_limit_below_the_rim_is_refused() -> None:
     with pytest.raises(InputError, match=r"`max_hole_px` must be >= 2\.0, got 1"):
         page_sheet(depth_map(plane_depth()), straight_outline(CORNERS), max_hole_px=1)
+
+
+def stepped_depth(step_mm: float = 12.0, edge: int = 100) -> Floats:
+    """The plane, its right part lifted towards the camera as by a flap."""
+    z = plane_depth()
+    z[:, edge:] -= step_mm
+    return z
+
+
+@pytest.mark.parametrize("gap", [0, 4])
+def test_a_jump_cuts_the_mesh_and_nothing_is_interpolated_across_it(gap: int) -> None:
+    """Also where the jump itself lies in a gap of the depth map, as beside a flap's shadow."""
+    missing = np.zeros((SIZE[1], SIZE[0]))
+    missing[:, 100 : 100 + gap] = 1
+    # Across a gap of four pixels of 2 mm even paper may climb some 30 mm.
+    step = 12.0 if gap == 0 else 60.0
+    mesh = page_mesh(depth_map(stepped_depth(step), missing), straight_outline(CORNERS), (20, 28))
+    assert mesh.sheet.cut is not None
+    # Every row of quads is cut, near the edge and nowhere else.
+    middles = (mesh.nodes[:-1, :-1, 0] + mesh.nodes[1:, 1:, 0]) / 2
+    assert mesh.sheet.cut.any(axis=1).all()
+    edge = 99.5 + gap / 2
+    assert np.abs(middles[mesh.sheet.cut] - edge).max() < 6
+    height = mesh.sheet.vertices @ NORMAL - OFFSET
+    side = np.where(mesh.nodes[..., 0] < edge, 0.0, step)
+    rays = projection.rays(CAMERA, mesh.nodes)
+    assert np.abs(height + side * (rays @ NORMAL)).max() < (
+        1.0 if gap == 0 else 4.0
+    )  # a pixel's own slope; 6 and 30 if blended
+
+
+@pytest.mark.parametrize("step_mm", [0.0, 1.5])
+def test_noise_and_steep_paper_are_no_jumps(step_mm: float) -> None:
+    sheet = page_mesh(depth_map(stepped_depth(step_mm)), straight_outline(CORNERS), (20, 28)).sheet
+    assert sheet.cut is None
+    climbing = np.tile(600.0 + 3.4 * np.arange(SIZE[0]), (SIZE[1], 1))  # 60 degrees at pixels of 2 mm
+    assert page_mesh(depth_map(climbing), straight_outline(CORNERS), (20, 28)).sheet.cut is None
+
+
+def test_depth_that_jumps_everywhere_is_refused() -> None:
+    z = plane_depth() + 30.0 * (np.indices((SIZE[1], SIZE[0])).sum(axis=0) % 2)
+    with pytest.raises(StepError, match="the depth jumps in every quad"):
+        page_mesh(depth_map(z), straight_outline(CORNERS), (5, 5))

@@ -204,3 +204,17 @@ def test_same_bytes_with_one_and_two_threads() -> None:
         )
         digests.add(done.stdout.decode().strip())
     assert len(digests) == 1
+
+
+def test_two_pieces_at_different_heights_fall_flat_without_pulling_at_each_other() -> None:
+    x, y = np.meshgrid(np.linspace(-40, 40, 9), np.linspace(30, -30, 7))
+    z = np.where(x > 5, 12.0, 0.0)
+    cut = np.zeros((6, 8), dtype=bool)
+    cut[:, 4] = True
+    sheet = Sheet(np.stack([x, y, z], -1), cut=cut)
+    torn = flatten(sheet, method="paper_euler")
+    assert torn.status is Status.AT_REST
+    assert torn.counters["folded_quads"] == 0
+    assert np.abs(torn.vertices[..., :2] - sheet.vertices[..., :2]).max() < 1e-6
+    whole = flatten(Sheet(sheet.vertices), method="paper_euler")
+    assert np.ptp(whole.vertices[..., 0]) > 84  # the step's slope was taken for paper

@@ -60,3 +60,27 @@ def test_triangle_mesh_is_refused() -> None:
     mesh = Sheet(np.eye(3), faces=np.array([[0, 1, 2]]))
     with pytest.raises(InputError, match=r"`sheet` must be an \(R, C, 3\) grid"):
         chord_springs(mesh, 1.0)
+
+
+def test_a_cut_quad_has_no_springs_of_its_own_and_its_neighbours_keep_theirs() -> None:
+    x, y = np.meshgrid(np.arange(5.0), np.arange(4.0))
+    cut = np.zeros((3, 4), dtype=bool)
+    cut[:, 2] = True
+    springs = chord_springs(Sheet(np.stack([x, y, 0 * x], -1), cut=cut), 10.0)
+    assert np.array_equal(springs.cut, cut)
+    a, b, rest, k_s = springs.pairs()
+    joined = k_s > 0
+    assert np.array_equal(joined, rest > 0)
+    assert not (joined & ((a % 5 <= 2) != (b % 5 <= 2))).any()  # nothing joins the two pieces
+    left, right = joined & (a % 5 <= 2), joined & (a % 5 > 2)
+    for piece, columns in ((left, 3), (right, 2)):  # each has every spring of a sheet of its own
+        assert piece.sum() == 4 * (columns - 1) + 3 * columns + 2 * 3 * (columns - 1)
+
+
+def test_a_sheet_in_one_piece_has_the_springs_of_a_sheet_that_says_nothing() -> None:
+    x, y = np.meshgrid(np.arange(5.0), np.arange(4.0))
+    vertices = np.stack([x, y, np.sin(x)], -1)
+    plain = chord_springs(Sheet(vertices), 10.0)
+    told = chord_springs(Sheet(vertices, cut=np.zeros((3, 4), dtype=bool)), 10.0)
+    assert np.array_equal(plain.k_s, told.k_s)
+    assert np.array_equal(plain.rest, told.rest)

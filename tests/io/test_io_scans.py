@@ -32,8 +32,8 @@ def scan(calibration: Calibration, depth: DepthMap) -> Scan:
         "white": rng.integers(0, 255, (8, 12), dtype=np.uint8),
         "raking": rng.integers(0, 65535, (20, 30, 3), dtype=np.uint16),
     }
-    sheet = Sheet(rng.normal(size=(3, 4, 3)), stiffness=rng.uniform(1, 2, (2, 3)))
-    return Scan(images, depth, calibration.camera, sheet, rng.uniform(0, 9, (4, 2)))
+    sheet = Sheet(rng.normal(size=(3, 4, 3)), stiffness=rng.uniform(1, 2, (2, 3)), cut=np.eye(2, 3, dtype=bool))
+    return Scan(images, depth, calibration.camera, sheet, rng.uniform(0, 9, (4, 2)), filled_fraction=0.25)
 
 
 def repacked(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
@@ -68,6 +68,9 @@ def test_a_scan_survives_exactly(tmp_path: Path, scan: Scan) -> None:
         assert found.images[light].dtype == image.dtype
         assert np.array_equal(found.images[light], image)
     assert found.sheet.vertices.tobytes() == scan.sheet.vertices.tobytes()
+    assert found.sheet.cut is not None
+    assert np.array_equal(found.sheet.cut, np.eye(2, 3, dtype=bool))
+    assert found.filled_fraction == scan.filled_fraction == 0.25
     assert found.sheet.stiffness is not None
     assert found.sheet.stiffness.tobytes() == scan.sheet.stiffness.tobytes()  # type: ignore[union-attr]
     assert found.camera.distortion.tobytes() == scan.camera.distortion.tobytes()
@@ -99,6 +102,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "white of floats": (lambda a: a.update(image_white=np.zeros((8, 12))), "image_white` must have 8 or 16 bits"),
     "sheet NaN": (lambda a: a["sheet_vertices"].fill(np.nan), "`vertices` must be finite"),
     "sheet of one row": (lambda a: a.update(sheet_vertices=np.zeros((1, 4, 3))), "R, C >= 2"),
+    "filled more than all": (lambda a: a["filled_fraction"].fill(1.5), r"`filled_fraction` must be in \[0, 1\]"),
     "stiffness negative": (lambda a: a["sheet_stiffness"].fill(-1), "`stiffness` must be positive"),
     "outline of three": (lambda a: a.update(outline=np.zeros((3, 2))), r"outline` must have shape \(4, 2\)"),
     "outline NaN": (lambda a: a["outline"].fill(np.nan), "`outline` must be finite"),

@@ -103,3 +103,15 @@ def test_disagreeing_shapes_and_coincident_vertices_are_refused() -> None:
         sheet_strain(Sheet(twice), flattened(flat_grid()))
     with pytest.raises(InputError, match="`true_uv` must have shape"):
         flat_error(flat_grid(), flat_grid())
+
+
+def test_what_happens_in_a_cut_is_no_strain() -> None:
+    cut = np.zeros((6, 8), dtype=bool)
+    cut[:, 3] = True
+    apart = flat_grid()
+    apart[:, 4:, 0] += 2.0
+    assert sheet_strain(Sheet(flat_grid(), cut=cut), flattened(apart))["strain_rms"] == pytest.approx(0.0, abs=1e-9)
+    crossed = flat_grid()
+    crossed[:, 4:, 0] -= 7.0
+    assert sheet_strain(Sheet(flat_grid(), cut=cut), flattened(crossed))["folded_quads"] == 0
+    assert sheet_strain(Sheet(flat_grid()), flattened(crossed))["folded_quads"] == 6

@@ -157,3 +157,16 @@ def test_mirrored_mesh_is_drawn_as_it_lies() -> None:
     drawn = np.isfinite(out[..., 0])
     np.testing.assert_allclose(out[drawn][:, 0], 116.0 - pixels()[drawn][:, 0], atol=1e-9)
     assert drawn.sum() > 6000
+
+
+def test_cut_quads_are_not_drawn() -> None:
+    nodes = grid(6, 8)
+    cut = np.zeros((5, 7), dtype=bool)
+    cut[:, 3] = True
+    whole, torn = (np.isfinite(backward_quads(nodes, nodes, SIZE, c)[..., 0]) for c in (None, cut))
+    gone = whole & ~torn
+    x = pixels()[..., 0][gone]
+    assert gone.any()
+    assert nodes[0, 3, 0] - 0.6 < x.min() < nodes[0, 3, 0] + 1.1
+    assert nodes[0, 4, 0] - 1.1 < x.max() < nodes[0, 4, 0] + 0.6
+    assert not (torn & ~whole).any()
