@@ -48,6 +48,14 @@ CaptureFolder = Annotated[
 ]
 CalibrationFile = Annotated[Path, typer.Option("--calibration", "-c", help="calibration.json of the same devices.")]
 Shape = Annotated[tuple[int, int], typer.Option("--shape", metavar="R C", help="Mesh vertices down and across.")]
+Mask = Annotated[
+    Path | None,
+    typer.Option("--mask", metavar="IMAGE", help="The page in the camera's picture, not black; found if not given."),
+]
+Ink = Annotated[bool, typer.Option("--ink", help="Take out what ink does to the depth; the paper does not.")]
+Denoise = Annotated[
+    bool, typer.Option("--denoise", help="Filter the depth, its creases kept; use with --ink on a printed page.")
+]
 Method = Annotated[str, typer.Option("--method", "-m", help="Flattening method.")]
 Lights = Annotated[
     list[str] | None,
@@ -120,17 +128,46 @@ def _open(folder: Path) -> Capture:
     return _watched(io.read_capture(folder), folder.name)
 
 
-def _scan(folder: Path, calibration: Calibration, shape: tuple[int, int], wanted: _Wanted | None = None) -> Scan:
-    allowed = all(2 <= n <= 1000 for n in shape)
-    require(allowed, "--shape", "be 2 to 1000 vertices down and across", f"{shape[0]} {shape[1]}")
+@dataclass(frozen=True, slots=True)
+class _Scanning:
+    """How a page is to be scanned."""
+
+    shape: tuple[int, int]
+    mask: Path | None
+    ink: bool
+    denoise: bool
+
+    def page(self, size: tuple[int, int]) -> Array | None:
+        """Read the mask, (height, width) bool."""
+        if self.mask is None:
+            return None
+        from deskew import io
+
+        picture = io.read_image(self.mask, size)
+        page: Array = (picture if picture.ndim == 2 else picture.max(axis=-1)) > 0
+        require(bool(page.any()), "--mask", "show the page: not black all over", str(self.mask))
+        return page
+
+
+def _scan(folder: Path, calibration: Calibration, how: _Scanning, wanted: _Wanted | None = None) -> Scan:
+    allowed = all(2 <= n <= 1000 for n in how.shape)
+    require(allowed, "--shape", "be 2 to 1000 vertices down and across", f"{how.shape[0]} {how.shape[1]}")
     capture = _open(folder)  # before the import below: a wrong folder is then refused within the blink of an eye
     if wanted is not None:
         from deskew.types import WHITE
 
         wanted.check([WHITE, *capture.textures])
-    from deskew import pipeline
+    mask = how.page(capture.camera_size)
+    from deskew import acquisition, pipeline
 
-    found = pipeline.scan(capture, calibration, shape=shape)
+    found = pipeline.scan(
+        capture,
+        calibration,
+        shape=how.shape,
+        mask=mask,
+        ink=acquisition.InkSettings() if how.ink else None,
+        denoise=acquisition.DenoiseSettings() if how.denoise else None,
+    )
     _warn(found.projector, folder.name)
     return found
 
@@ -230,6 +267,9 @@ def scan(
     calibration: CalibrationFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="scan.npz (everything) or scan.ply (the mesh).")],
     shape: Shape = (45, 45),
+    mask: Mask = None,
+    ink: Ink = False,
+    denoise: Denoise = False,
     as_json: Json = False,
 ) -> None:
     """Measure the page's 3D shape: depth map and mesh, in millimetres.
@@ -241,7 +281,7 @@ def scan(
     from deskew import io, projection
 
     io.require_writable(output, (".npz", ".ply"))
-    found = _scan(capture, io.read_calibration(calibration), shape)
+    found = _scan(capture, io.read_calibration(calibration), _Scanning(shape, mask, ink, denoise))
     if output.suffix.lower() == ".npz":
         io.write_scan(found, output)
     else:
@@ -336,6 +376,9 @@ def run(
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
     method: Method = "paper_euler",
     shape: Shape = (45, 45),
+    mask: Mask = None,
+    ink: Ink = False,
+    denoise: Denoise = False,
     lights: Lights = None,
     combine: Combine = None,
     scale: Scale = 1.0,
@@ -352,7 +395,8 @@ def run(
     io.require_writable(output, (".png", ".tif", ".tiff"))
     _require_method(method)
     wanted = _Wanted.of(lights, combine, scale)
-    _restore(_scan(capture, io.read_calibration(calibration), shape, wanted), method, output, as_json, wanted)
+    how = _Scanning(shape, mask, ink, denoise)
+    _restore(_scan(capture, io.read_calibration(calibration), how, wanted), method, output, as_json, wanted)
 
 
 def _require_method(method: str) -> None:

@@ -17,6 +17,7 @@ import pytest
 
 import deskew
 from deskew import io
+from deskew.acquisition import DenoiseSettings, InkSettings
 from deskew.cli import main
 from deskew.errors import StepError
 from deskew.restoration import Textures
@@ -76,9 +77,9 @@ class StandIn:
         self._step("calibrate", board=board, poses=poses)
         return replace(CALIBRATION, n_poses=len(poses))
 
-    def scan(self, page: Capture, calibration: Calibration, *, shape: tuple[int, int]) -> Scan:
+    def scan(self, page: Capture, calibration: Calibration, *, shape: tuple[int, int], **how: Any) -> Scan:
         frames = [*page.columns, *page.rows]
-        self._step("scan", frames=frames, calibration=calibration, shape=shape)
+        self._step("scan", frames=frames, calibration=calibration, shape=shape, **how)
         reason = np.zeros((8, 12), np.uint8)
         reason[0, :3] = 1
         depth = DepthMap(np.where(reason == 0, 9.0, np.nan), reason, CAMERA)
@@ -112,6 +113,8 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     io.write_calibration(CALIBRATION, tmp_path / "c.json")
     io.write_scan(StandIn().scan(capture(), CALIBRATION, shape=(3, 4)), tmp_path / "scan.npz")
     (tmp_path / "out").mkdir()
+    for name, size, level in (("mask", (8, 12), 255), ("dark", (8, 12), 0), ("small", (4, 4), 255)):
+        io.write_image(np.full(size, level, np.uint8), tmp_path / f"{name}.png")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -148,6 +151,18 @@ def test_scan_writes_everything_for_restore(
     assert io.read_scan(here / "out" / "s.npz").sheet.vertices.shape == (*shape, 3)
     assert run("restore out/s.npz -o out/r.png", capsys)[0] == 0
     assert np.array_equal(io.read_image(here / "out" / "r.png"), capture().white[::-1])
+
+
+def test_a_mask_and_the_corrections_of_depth_are_taken_when_asked_for(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("run page -c c.json -o out/r.png", capsys)[0] == 0
+    assert [steps.calls["scan"][name] for name in ("mask", "ink", "denoise")] == [None, None, None]
+    assert run("scan page -c c.json -o out/s.npz --mask mask.png --ink --denoise", capsys)[0] == 0
+    assert steps.calls["scan"]["mask"].shape == (8, 12)
+    assert steps.calls["scan"]["mask"].dtype == np.bool_
+    assert steps.calls["scan"]["ink"] == InkSettings()
+    assert steps.calls["scan"]["denoise"] == DenoiseSettings()
 
 
 def test_a_scanned_mesh_carries_its_place_in_the_white_image(
@@ -305,6 +320,9 @@ WRONG_LINES = {
     "shape of one": ("run page -c c.json -o out/r.png --shape 45", "'--shape' requires 2 arguments"),
     "shape of words": ("run page -c c.json -o out/r.png --shape 45 x", "Invalid value for '--shape'"),
     "shape of fractions": ("run page -c c.json -o out/r.png --shape 4.5 4", "Invalid value for '--shape'"),
+    "mask missing": ("scan page -c c.json -o out/s.npz --mask none.png", "none.png"),
+    "mask of another size": ("run page -c c.json -o out/r.png --mask small.png", "small.png"),
+    "mask of nothing": ("run page -c c.json -o out/r.png --mask dark.png", "`--mask` must show the page"),
     "shape 1": ("run page -c c.json -o out/r.png --shape 1 45", "`--shape` must be 2 to 1000 vertices down and across"),
     "shape endless": ("run page -c c.json -o out/r.png --shape 1000000 3", "`--shape` must be 2 to 1000 vertices"),
     "shape negative": ("scan page -c c.json -o out/s.npz --shape -4 -4", "`--shape` must be 2 to 1000"),
