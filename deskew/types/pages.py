@@ -1,0 +1,168 @@
+"""A page as a surface: scanned, flattened, restored (sections 3 and 3.5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from deskew.errors import require
+from deskew.types.arrays import Array, Floats, require_numbers
+from deskew.types.depth import DepthMap, ProjectorCheck
+from deskew.types.devices import Pinhole
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """A surface to be flattened.
+
+    Attributes
+    ----------
+    vertices : (R, C, 3) grid or (V, 3) array
+        Positions in the world [mm]; a grid's rows run along the page's v, its columns along u.
+    faces : (F, 3) int array or None
+        Triangles; None for a grid.
+    stiffness : (R - 1, C - 1) array or None
+        Spring constant k_s of each quad of a grid [kg/s^2]; None for the method's own uniform value.
+    cut : (R - 1, C - 1) bool array or None
+        Quads of a grid across which the surface breaks off: nothing joins their sides. None for a sheet in one piece.
+    """
+
+    vertices: Floats
+    faces: npt.NDArray[np.integer[Any]] | None = None
+    stiffness: Floats | None = None
+    cut: npt.NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        require_numbers("vertices", self.vertices, "fiu")
+        if self.faces is not None:
+            require_numbers("faces", self.faces, "iu")
+        if self.stiffness is not None:
+            require_numbers("stiffness", self.stiffness, "fiu")
+        vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
+        object.__setattr__(self, "vertices", vertices)
+        if self.faces is None:
+            shape = vertices.shape
+            grid = vertices.ndim == 3 and shape[2] == 3 and min(shape[:2]) >= 2
+            require(grid, "vertices", "have shape (R, C, 3) with R, C >= 2 when `faces` is None", shape)
+        else:
+            require(vertices.ndim == 2 and vertices.shape[1] == 3, "vertices", "have shape (V, 3)", vertices.shape)
+            require(self.faces.ndim == 2 and self.faces.shape[1] == 3, "faces", "have shape (F, 3)", self.faces.shape)
+            n = len(vertices)
+            inside = self.faces.size > 0 and int(self.faces.min()) >= 0 and int(self.faces.max()) < n
+            require(inside, "faces", f"be non-empty with indices in [0, {n - 1}]", f"{len(self.faces)} faces")
+        require(
+            bool(np.isfinite(vertices).all()),
+            "vertices",
+            "be finite",
+            f"{int((~np.isfinite(vertices)).any(-1).sum())} vertices with NaN or infinity",
+        )
+        if self.stiffness is not None:
+            shape = (vertices.shape[0] - 1, vertices.shape[1] - 1)
+            require(
+                self.faces is None and self.stiffness.shape == shape,
+                "stiffness",
+                f"have shape {shape}, one value a quad",
+                self.stiffness.shape,
+            )
+            require(
+                bool((self.stiffness > 0).all() and np.isfinite(self.stiffness).all()),
+                "stiffness",
+                "be positive and finite [kg/s^2]",
+                f"a minimum of {np.min(self.stiffness)}",
+            )
+        if self.cut is not None:
+            shape = (vertices.shape[0] - 1, vertices.shape[1] - 1)
+            sound = self.faces is None and self.cut.shape == shape and self.cut.dtype == np.bool_
+            require(sound, "cut", f"be bool of shape {shape}, one value a quad of a grid", self.cut.shape)
+            require(not self.cut.all(), "cut", "leave a quad whole", "every quad cut")
+
+
+class Status(StrEnum):
+    """How a flattening ended."""
+
+    AT_REST = "at_rest"
+    LOCKED = "locked"
+    FOLDED = "folded"
+    DIVERGED = "diverged"
+
+
+@dataclass(frozen=True, slots=True)
+class Flattened:
+    """A sheet after flattening.
+
+    Attributes
+    ----------
+    vertices : array of the sheet's shape
+        Final positions in the world [mm]; z = 0 wherever `status` is `AT_REST`.
+    status : Status
+        How it ended.
+    remedy : str
+        What to try when `status` is not `AT_REST`; empty otherwise.
+    counters : mapping
+        `steps`, `steps_rejected`, `force_evaluations`, `contacts`, `folded_quads`, `spring_energy` [uJ], ...
+        whatever the method counts.
+    """
+
+    vertices: Floats
+    status: Status
+    remedy: str = ""
+    counters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """What acquisition hands on: everything a restoration method may see.
+
+    Attributes
+    ----------
+    images : mapping of light name to (height, width[, 3]) array
+        Raw camera images; always holds "white".
+    depth : DepthMap
+        Depth on the undistorted grid.
+    camera : Pinhole
+        The raw camera, with its distortion.
+    sheet : Sheet
+        The page as a grid over its outline.
+    outline : (4, 2) array
+        The page's corners on the undistorted grid [px], in the grid's order: first row's first and last vertex, last
+        row's last and first.
+    projector : ProjectorCheck
+        What the capture's frames say about the projector; a file does not keep it.
+    filled_fraction : float
+        Share of the sheet's inner vertices whose depth was not measured but carried over from the surroundings.
+    """
+
+    images: Mapping[str, Array]
+    depth: DepthMap
+    camera: Pinhole
+    sheet: Sheet
+    outline: Floats
+    projector: ProjectorCheck = field(default_factory=ProjectorCheck)
+    filled_fraction: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Restoration:
+    """A restored page (section 3.5).
+
+    Attributes
+    ----------
+    image : (height, width[, 3]) array
+        The undistorted pinhole view of the flattened page on Z = 0; 0 outside the page.
+    backward_map : (height, width, 2) float32 array
+        Raw camera pixel (x, y) that each restored pixel came from, NaN outside the page.
+    camera : Pinhole
+        The ideal camera that the view is seen through.
+    flattened : Flattened or None
+        The geometry behind it; None for an image-only method.
+    """
+
+    image: Array
+    backward_map: npt.NDArray[np.float32]
+    camera: Pinhole
+    flattened: Flattened | None = None
