@@ -12,6 +12,7 @@ STUDIES = {
     "corner_distance": "experiments.studies.corner_distance:CornerDistance",
     "textures": "experiments.studies.textures:TexturesStudy",
     "real_boards": "experiments.studies.real_boards:RealBoards",
+    "speed": "experiments.studies.speed:Speed",
 }
 
 

@@ -52,7 +52,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
         (
             "experiment=stiffness",
-            ("`experiment`", "corner_distance, fake, plane_accuracy, real_boards, textures", "'stiffness'"),
+            ("`experiment`", "corner_distance, fake, plane_accuracy, real_boards, speed, textures", "'stiffness'"),
         ),
         ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
         ("trials", ("`trials`", "KEY=VALUE")),
@@ -212,7 +212,7 @@ def test_without_an_experiment_the_program_lists_them(capsys: pytest.CaptureFixt
     assert main([]) == 2
     error = capsys.readouterr().err
     assert error.splitlines() == [
-        "`experiment` must be one of corner_distance, plane_accuracy, real_boards, textures, got nothing."
+        "`experiment` must be one of corner_distance, plane_accuracy, real_boards, speed, textures, got nothing."
     ]
 
 
