@@ -16,7 +16,7 @@ EXPERIMENTS := plane_accuracy corner_distance real_boards
 # What a run at this budget may overwrite: smoke proves that it runs and never touches the committed reports.
 REPORTS = $(if $(filter smoke,$(BUDGET)),out/smoke,reports)
 
-.PHONY: setup reproduce $(EXPERIMENTS) test lint format lock clean help
+.PHONY: setup reproduce $(EXPERIMENTS) bench test lint format lock clean help
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -35,6 +35,11 @@ reproduce: $(EXPERIMENTS) ## run every experiment and regenerate reports/ (BUDGE
 $(EXPERIMENTS): $(STAMP)
 	@$(BIN)/python -m experiments experiment=$@ budget=$(BUDGET) out=$(REPORTS)/$@ \
 		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)'))
+
+bench: $(STAMP) ## time every stage against a memory triad; writes out/speed/ (TRIALS=15 repeats more)
+	@rm -rf out/speed
+	@$(BIN)/python -m experiments experiment=speed out=out/speed $(if $(TRIALS),trials=$(TRIALS))
+	@cat out/speed/table.md
 
 test: $(STAMP) ## run the tests
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=$(JOBS) --dist=worksteal

@@ -69,9 +69,11 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class _Painter:
-    """A sweep's samples sorted by line, with the scratch planes of one run through it."""
+    """A sweep's samples sorted by line, with the tables and the scratch planes of one run through it."""
 
     sweep: Sweep
+    profile: Floats
+    taps: Floats
     starts: Ints
     places: npt.NDArray[np.int16]
     values: Floats
@@ -84,7 +86,8 @@ class _Painter:
         coordinate, light = sweep.coordinate, sweep.light
         if not sweep.upright:
             coordinate, light = np.ascontiguousarray(coordinate.T), np.ascontiguousarray(light.T)
-        reach = len(line_profile(sweep.config.projector_blur_sigma_px)) / PROFILE_STEPS
+        profile, taps = line_profile(sweep.config.projector_blur_sigma_px), psf_taps(sweep.config.camera_psf_sigma_px)
+        reach = len(profile) / PROFILE_STEPS
         starts, places, values = _sorted_by_line(coordinate, light, sweep.n_lines, reach)
         read, shot = sweep.config.noise_variance
         mean = sweep.black.ravel()
@@ -95,7 +98,7 @@ class _Painter:
             np.tile(np.array([[columns, -1]], dtype=np.int64), (rows, 1)),
             np.zeros(columns, dtype=np.float32),
         )
-        return cls(sweep, starts, places, values, (mean, sigma, read, shot), scratch)
+        return cls(sweep, profile, taps, starts, places, values, (mean, sigma, read, shot), scratch)
 
     def frame(self, line: int) -> npt.NDArray[np.uint8]:
         """Render one frame."""
@@ -105,18 +108,16 @@ class _Painter:
         image = np.empty(sweep.black.shape, dtype=np.uint8)
         expose(mean, sigma, quantile_table(), sweep.key, number, image.reshape(-1))
         plane, spans, buffer = self.scratch
-        profile = line_profile(sweep.config.projector_blur_sigma_px)
         top, bottom = len(plane), -1
         for shown, share in frames_in(sweep.config, sweep.key, number, line):
             if shown >= 0:
-                weighted = np.float32(share) * profile
+                weighted = np.float32(share) * self.profile
                 first, last = _scatter(self.starts, self.places, self.values, shown, weighted, plane, spans)
                 top, bottom = min(top, first), max(bottom, last)
-        taps = psf_taps(sweep.config.camera_psf_sigma_px)
         _, width = sweep.black.shape
         strides = (width, 1) if sweep.upright else (1, width)
         noise = (quantile_table(), sweep.key, number, np.float32(read), np.float32(shot))
-        _paint(plane, spans, buffer, top, bottom, taps, mean, strides, noise, image.reshape(-1))
+        _paint(plane, spans, buffer, top, bottom, self.taps, mean, strides, noise, image.reshape(-1))
         _clear(plane, spans, top, bottom)
         return image
 

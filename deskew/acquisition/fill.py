@@ -87,8 +87,8 @@ def fill_depth(depth: DepthMap, outline: Outline, max_hole_px: float) -> FilledD
     for sigma in (*WINDOWS_PX, 16.0):
         if not missing.any():
             break
-        plane, support = _local_planes(inverse, measured, sigma)
-        good = missing & (support >= SUPPORT_MIN)
+        plane = _local_planes(inverse, measured, sigma, missing)
+        good = np.isfinite(plane)
         inverse[good] = plane[good]
         missing &= ~good
     missing |= torn
@@ -125,8 +125,10 @@ def _require_small_holes(measured: npt.NDArray[np.bool_], page: npt.NDArray[np.b
         )
 
 
-def _local_planes(inverse: Floats, measured: npt.NDArray[np.bool_], sigma: float) -> tuple[Floats, Floats]:
-    """Value of the weighted least-squares plane around every pixel, and the share of the window that has depth.
+def _local_planes(
+    inverse: Floats, measured: npt.NDArray[np.bool_], sigma: float, asked: npt.NDArray[np.bool_]
+) -> Floats:
+    """Value of the weighted least-squares plane around the pixels asked for; NaN elsewhere and where depth is scarce.
 
     Normalised convolution of first order: the moments of the Gaussian window over the measured pixels.
     """
@@ -141,18 +143,17 @@ def _local_planes(inverse: Floats, measured: npt.NDArray[np.bool_], sigma: float
 
     def moment(image: Floats, px: int, py: int) -> Floats:
         filtered = cv2.sepFilter2D(image, cv2.CV_64F, kernels[px], kernels[py], borderType=cv2.BORDER_CONSTANT)
-        return np.asarray(filtered)
+        return np.asarray(filtered[at])
 
+    at = asked & (cv2.sepFilter2D(weight, cv2.CV_64F, g, g, borderType=cv2.BORDER_CONSTANT) >= SUPPORT_MIN)
     s0 = moment(weight, 0, 0)
     # A ridge on the slopes keeps them finite where the window holds a single line of pixels.
     ridge = 1e-6 * sigma**2 * s0 + 1e-12
     sx, sy, sxy = moment(weight, 1, 0), moment(weight, 0, 1), moment(weight, 1, 1)
     normal = np.stack(
-        [s0 + 1e-12, sx, sy, sx, moment(weight, 2, 0) + ridge, sxy, sy, sxy, moment(weight, 0, 2) + ridge]
+        [s0 + 1e-12, sx, sy, sx, moment(weight, 2, 0) + ridge, sxy, sy, sxy, moment(weight, 0, 2) + ridge], axis=-1
     )
     right = np.stack([moment(value, 0, 0), moment(value, 1, 0), moment(value, 0, 1)], axis=-1)
-    wanted = s0 >= SUPPORT_MIN
     plane = np.full(inverse.shape, np.nan)
-    matrices = normal[:, wanted].T.reshape(-1, 3, 3)
-    plane[wanted] = middle + np.linalg.solve(matrices, right[wanted][..., None])[:, 0, 0]
-    return plane, s0
+    plane[at] = middle + np.linalg.solve(normal.reshape(-1, 3, 3), right[..., None])[:, 0, 0]
+    return plane

@@ -15,7 +15,7 @@ from typing import Any
 from deskew.errors import StepError, require
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.layout import Layout
-from experiments.reporting.tables import table
+from experiments.reporting.tables import table, times_page
 from experiments.trials.schema import Failure, Row
 
 
@@ -30,7 +30,7 @@ class Results:
 
 
 def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str, Any]) -> None:
-    """Write `results.csv`, `timings.csv`, `table.md`, `figures/*.png` and `run.json` under `out`.
+    """Write `results.csv`, `timings.csv`, `table.md`, `figures/*.png`, `run.json` and any `profile.md` under `out`.
 
     Everything is made before the first file is replaced, so what fails leaves the old report standing.
     """
@@ -38,9 +38,11 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
     files: dict[str, bytes] = {
         "results.csv": csv_text(results.rows).encode(),
         "timings.csv": csv_text(results.timings).encode(),
-        "table.md": table(layout, results.rows, results.failures).encode(),
+        "table.md": table(layout, results.rows, results.failures, results.timings).encode(),
         "run.json": (json.dumps(run, indent=2, sort_keys=True) + "\n").encode(),
     }
+    if layout.profile is not None:
+        files["profile.md"] = times_page(layout.profile, results.timings).encode()
     for plot in layout.plots:
         figure = dot_plot(plot, results.rows)
         if figure is not None:
@@ -59,7 +61,14 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
 def require_targets(out: Path, layout: Layout) -> None:
     """Raise an InputError where a report could not be written under `out`: to be asked before the trials."""
     drawn = [*(plot.name for plot in layout.plots), *(montage.name for montage in layout.montages)]
-    names = ["results.csv", "timings.csv", "table.md", "run.json", *(f"figures/{name}.png" for name in drawn)]
+    names = [
+        "results.csv",
+        "timings.csv",
+        "table.md",
+        "profile.md",
+        "run.json",
+        *(f"figures/{name}.png" for name in drawn),
+    ]
     _require_replaceable(out, names)
 
 

@@ -81,6 +81,26 @@ class Montage:
 
 
 @dataclass(frozen=True, slots=True)
+class Times:
+    """A table of `timings.csv`: a line a condition and method that has any of the columns.
+
+    Attributes
+    ----------
+    title, note : str
+        Heading, and the sentences under it.
+    columns : tuple of Column
+        Metrics of the timings, left to right; within a condition the lines fall in the first one.
+    order : tuple of str
+        The conditions from top to bottom; others follow by name.
+    """
+
+    title: str
+    note: str
+    columns: tuple[Column, ...]
+    order: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Layout:
     """Table and figures of one study.
 
@@ -94,6 +114,8 @@ class Layout:
         The figures.
     montages : tuple of Montage
         Figures of pictures; a picture in one of them is not written by itself.
+    times, profile : Times or None
+        Of a study of speed: what heads `table.md`, and what is written as `profile.md`.
     """
 
     title: str
@@ -101,3 +123,5 @@ class Layout:
     columns: tuple[Column, ...]
     plots: tuple[Plot, ...] = ()
     montages: tuple[Montage, ...] = ()
+    times: Times | None = None
+    profile: Times | None = None

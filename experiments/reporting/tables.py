@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from statistics import median
 
-from experiments.reporting.layout import Column, Layout
+from experiments.reporting.layout import Column, Layout, Times
 from experiments.reporting.statistics import share_interval, summarise
 from experiments.trials.schema import Failure, Row
 
@@ -23,7 +24,7 @@ def markdown_table(headings: Sequence[str], lines: Iterable[Sequence[str]]) -> s
     return "\n".join("| " + " | ".join(cells) + " |" for cells in (headings, rule, *lines))
 
 
-def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure]) -> str:
+def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timings: Sequence[Row] = ()) -> str:
     """Return the text of `table.md`.
 
     Parameters
@@ -34,8 +35,12 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure]) -> s
         All results.
     failures : sequence of Failure
         Each is listed with its reason.
+    timings : sequence of Row
+        Shown where the layout asks for times.
     """
     parts = [f"# {layout.title}", layout.note]
+    if layout.times is not None:
+        parts += [f"## {layout.times.title}", layout.times.note, _times(layout.times, timings)]
     if any(column.headline for column in layout.columns):
         parts += [
             "## Summary",
@@ -50,6 +55,33 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure]) -> s
         lines = [[str(f.trial), str(f.seed), f.condition, f.method, f.reason.replace("|", "/")] for f in failures]
         parts += ["## Failed", markdown_table(("trial", "seed", "condition", "method", "reason"), lines)]
     return "\n\n".join(parts) + "\n"
+
+
+def times_page(times: Times, timings: Sequence[Row]) -> str:
+    """Return a table of times as a page of its own."""
+    return "\n\n".join((f"# {times.title}", times.note, _times(times, timings))) + "\n"
+
+
+def _times(times: Times, timings: Sequence[Row]) -> str:
+    """Return a line a condition and method; of several trials the median."""
+    found = [
+        (place, [median(metrics[column.metric]) if column.metric in metrics else None for column in times.columns])
+        for place, metrics in _by_place(timings).items()
+    ]
+    ranks = {condition: rank for rank, condition in enumerate(times.order)}
+    found.sort(key=lambda item: (ranks.get(item[0][0], len(ranks)), item[0][0], -(item[1][0] or 0.0), item[0][1]))
+    lines = [
+        [
+            *place,
+            *(
+                _NONE if value is None else f"{value:.{c.digits}f}"
+                for value, c in zip(values, times.columns, strict=True)
+            ),
+        ]
+        for place, values in found
+        if any(value is not None for value in values)
+    ]
+    return markdown_table(("condition", "method", *(column.heading for column in times.columns)), lines)
 
 
 def _each_trial(layout: Layout, rows: Sequence[Row]) -> str:

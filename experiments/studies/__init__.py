@@ -13,6 +13,7 @@ STUDIES = {
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
     "real_boards": "experiments.studies.real_boards:RealBoards",
+    "speed": "experiments.studies.speed:Speed",
 }
 
 

@@ -61,9 +61,10 @@ class Recorder:
     def __init__(self, key: TrialKey) -> None:
         self.key = key
         self._rows: dict[tuple[str, str, str], Row] = {}
-        self._seconds: dict[tuple[str, str, str], float] = {}
+        self._timings: dict[tuple[str, str, str], float] = {}
         self._failures: list[Failure] = []
         self._pictures: dict[str, bytes] = {}
+        self._peak_mb = 0.0
         _reset_peak()
 
     def add(self, condition: str, method: str, metrics: Mapping[str, float]) -> None:
@@ -87,7 +88,21 @@ class Recorder:
             yield
         finally:
             place = (condition or self.key.condition, method or self.key.method, f"seconds_{name}")
-            self._seconds[place] = self._seconds.get(place, 0.0) + time.perf_counter() - start
+            self._timings[place] = self._timings.get(place, 0.0) + time.perf_counter() - start
+
+    @contextmanager
+    def memory(self, condition: str, method: str = "-") -> Iterator[None]:
+        """Record the process's peak memory during the block as `peak_mb` [MB]."""
+        self._peak_mb = max(self._peak_mb, _peak_mb())
+        _reset_peak()
+        yield
+        peak = _peak_mb()
+        self._peak_mb = max(self._peak_mb, peak)
+        self.add_times(condition, method, {"peak_mb": peak})
+
+    def add_times(self, condition: str, method: str, metrics: Mapping[str, float]) -> None:
+        """Record numbers that no rerun repeats; they go into `timings.csv` and nowhere else."""
+        self._timings |= {(condition, method, metric): value for metric, value in metrics.items()}
 
     @contextmanager
     def attempt(self, condition: str, method: str = "-") -> Iterator[None]:
@@ -106,8 +121,8 @@ class Recorder:
 
     def outcome(self) -> Outcome:
         """Return what was recorded, with the peak memory of the process during the trial."""
-        timings = [Row.of(self.key, *place, seconds) for place, seconds in self._seconds.items()]
-        timings.append(Row.of(self.key, self.key.condition, self.key.method, "peak_mb", _peak_mb()))
+        timings = [Row.of(self.key, *place, value) for place, value in self._timings.items()]
+        timings.append(Row.of(self.key, self.key.condition, self.key.method, "peak_mb", max(self._peak_mb, _peak_mb())))
         rows = tuple(sorted(self._rows.values()))
         return Outcome(rows, tuple(sorted(timings)), tuple(sorted(self._failures)), dict(self._pictures))
 

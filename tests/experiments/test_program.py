@@ -18,6 +18,7 @@ import pytest
 
 from experiments.complaints import refuse_arguments
 from experiments.program import main
+from experiments.studies import STUDIES
 from tests.experiments.conftest import Program
 from tests.experiments.fake_study import ABSENT, ALL_FAIL, NAN, STEP_FAILS, TRIAL_1_FAILS, FakeStudy
 
@@ -52,7 +53,11 @@ ROOT = Path(__file__).resolve().parents[2]
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
         (
             "experiment=stiffness",
-            ("`experiment`", "corner_distance, decoders, fake, plane_accuracy, real_boards, textures", "'stiffness'"),
+            (
+                "`experiment`",
+                "corner_distance, decoders, fake, plane_accuracy, real_boards, speed, textures",
+                "'stiffness'",
+            ),
         ),
         ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
         ("trials", ("`trials`", "KEY=VALUE")),
@@ -211,9 +216,7 @@ def test_a_report_that_breaks_while_it_is_written_leaves_the_old_one(
 def test_without_an_experiment_the_program_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([]) == 2
     error = capsys.readouterr().err
-    assert error.splitlines() == [
-        "`experiment` must be one of corner_distance, decoders, plane_accuracy, real_boards, textures, got nothing."
-    ]
+    assert error.splitlines() == [f"`experiment` must be one of {', '.join(sorted(STUDIES))}, got nothing."]
 
 
 def test_every_planned_study_has_a_configuration_and_every_configuration_its_study() -> None:
