@@ -3,6 +3,7 @@
 It shares no mathematics with the reconstruction, so that a common error cannot cancel.
 """
 
+from data_synth.balls import BallPlate, ball_plate
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
 from data_synth.pages import Blank, Checkerboard, Page, board_page
@@ -14,6 +15,7 @@ from data_synth.truth import Truth
 __all__ = [
     "BOARD",
     "PAGE_SIZE_MM",
+    "BallPlate",
     "Blank",
     "BoardPose",
     "Checkerboard",
@@ -23,6 +25,7 @@ __all__ = [
     "TrueSheet",
     "Truth",
     "View",
+    "ball_plate",
     "board_page",
     "board_poses",
     "crumpled",

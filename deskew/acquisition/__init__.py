@@ -5,6 +5,7 @@ from deskew.acquisition.accuracy import (
     average_deviation,
     depth_points,
     fit_plane,
+    flatness_mm,
     length_errors,
     plane_deviation,
 )
@@ -22,6 +23,7 @@ from deskew.acquisition.ink import InkSettings, correct_ink
 from deskew.acquisition.matches import require_same_devices
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, page_outline, straight_outline
+from deskew.acquisition.spheres import Probing, Sphere, fit_sphere, probe_sphere, spacing_error_mm
 from deskew.acquisition.stripes import decode_sweep
 from deskew.acquisition.sweep import SweepSettings
 
@@ -34,6 +36,8 @@ __all__ = [
     "Outline",
     "PageMesh",
     "PlaneDeviation",
+    "Probing",
+    "Sphere",
     "SweepSettings",
     "average_deviation",
     "board_points",
@@ -47,15 +51,19 @@ __all__ = [
     "depth_points",
     "find_board",
     "fit_plane",
+    "fit_sphere",
+    "flatness_mm",
     "kitchen_rosenfeld_peaks",
     "length_errors",
     "page_mesh",
     "page_outline",
     "page_sheet",
     "plane_deviation",
+    "probe_sphere",
     "refine_kitchen_rosenfeld",
     "refine_saddle",
     "require_same_devices",
+    "spacing_error_mm",
     "straight_outline",
     "view_board",
 ]
