@@ -71,8 +71,8 @@ def ball_plate(
     spacing_mm : float
         Between the centres, which lie on a line through the plate's middle; at least 0.3 times the diagonal there.
     rim_deg : float
-        Where a ball meets the plate, as an angle from its top, in [20, 75]. With the default rig's projector, whose rays
-        descend at 62 to 72 degrees, 55 degrees on a plate tilted by up to 5 degrees are lit all around.
+        Where a ball meets the plate, as an angle from its top, in [20, 75]. The default rig's projector,
+        whose rays descend at 62 to 72 degrees, lights all of 55 degrees on a plate tilted by up to 5 degrees.
     tilt_deg : float
         Angle of the plate against the bed, in [0, 30].
     azimuth_deg : float

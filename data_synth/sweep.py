@@ -83,7 +83,7 @@ class _Painter:
         coordinate, light = sweep.coordinate, sweep.light
         if not sweep.upright:
             coordinate, light = np.ascontiguousarray(coordinate.T), np.ascontiguousarray(light.T)
-        reach = len(line_profile(sweep.config.projector_blur_sigma_px)) / PROFILE_STEPS
+        reach = len(line_profile(sweep.config.projector_blur_sigma_px, sweep.config.stripe_width_px)) / PROFILE_STEPS
         starts, places, values = _sorted_by_line(coordinate, light, sweep.n_lines, reach)
         read, shot = sweep.config.noise_variance
         mean = sweep.black.ravel()
@@ -104,7 +104,7 @@ class _Painter:
         image = np.empty(sweep.black.shape, dtype=np.uint8)
         expose(mean, sigma, quantile_table(), sweep.key, number, image.reshape(-1))
         plane, spans, buffer = self.scratch
-        profile = line_profile(sweep.config.projector_blur_sigma_px)
+        profile = line_profile(sweep.config.projector_blur_sigma_px, sweep.config.stripe_width_px)
         top, bottom = _scatter(self.starts, self.places, self.values, line, profile, plane, spans)
         taps = psf_taps(sweep.config.camera_psf_sigma_px)
         _, width = sweep.black.shape

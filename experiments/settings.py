@@ -105,10 +105,24 @@ class PageSettings(Checked):
 
 @dataclass
 class RigSettings(Checked):
-    """The synthetic rig."""
+    """The synthetic rig; every key can be swept.
+
+    `camera_blur_px`: standard deviation of the lens's blur.
+    `baseline_mm`: distance of projector and camera along X; the projector moves on a circle about where it is aimed.
+    `stripe_width_px`: neighbouring projector lines that a frame lights; the blur of the projector's lens stays.
+    `gamma`: of the projector; as lines are lit below full code it also decides how bright they are.
+    `ambient`: light of an even sky.
+    """
 
     group: ClassVar[str] = "rig."
     noise_scale: float = number(1.0, 0.0, 10.0, "times the rig's own noise")
+    camera_blur_px: float = number(0.75, 0.3, 3.0, "camera pixels")
+    baseline_mm: float = number(426.0, 100.0, 700.0, "mm")
+    stripe_width_px: int = setting(
+        1, "be an odd whole number in [1, 15] of projector lines", lambda value: value in range(1, 16, 2)
+    )
+    gamma: float = number(2.2, 0.5, 4.0)
+    ambient: float = number(0.03, 0.0, 1.0, "times the projector's full light")
     board_poses: int = count(9, 3, 12)
 
 

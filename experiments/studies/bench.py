@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from data_synth import Rig
 from deskew import pipeline
 from deskew.acquisition import SweepSettings
 from deskew.types import Calibration
-from experiments.settings import Config
+from experiments.settings import Config, RigSettings
 
 # Random numbers of the calibration shots: a trial's number that no trial has.
 _CALIBRATION = 2**32 - 1
@@ -31,9 +31,22 @@ class Bench:
         }
 
 
+def configured_rig(settings: RigSettings) -> Rig:
+    """Return the rig that the configuration asks for."""
+    rig = data_synth.default_rig(settings.noise_scale, baseline_mm=settings.baseline_mm)
+    config = replace(
+        rig.config,
+        camera_psf_sigma_px=settings.camera_blur_px,
+        stripe_width_px=settings.stripe_width_px,
+        projector_gamma=settings.gamma,
+        ambient=settings.ambient,
+    )
+    return replace(rig, config=config)
+
+
 def calibrated_bench(config: Config) -> Bench:
     """Photograph the printed board in its poses and calibrate both devices from that."""
-    rig = data_synth.default_rig(config.rig.noise_scale)
+    rig = configured_rig(config.rig)
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
