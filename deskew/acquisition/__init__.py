@@ -1,6 +1,7 @@
 """From a capture to a depth map and a mesh (section 2): corners, calibration, decoding, culling, triangulation."""
 
 from deskew.acquisition.accuracy import (
+    DISCARDED_SHARE,
     PlaneDeviation,
     average_deviation,
     depth_points,
@@ -28,6 +29,7 @@ from deskew.acquisition.stripes import decode_sweep
 from deskew.acquisition.sweep import SweepSettings
 
 __all__ = [
+    "DISCARDED_SHARE",
     "BoardView",
     "DenoiseSettings",
     "DepthSettings",
