@@ -11,7 +11,7 @@ _TARGETS = ("white", "checkered", "sphere", "fault")
 _STATED = dict.fromkeys(_TARGETS, "0.25..0.5")
 _MEAN = dict.fromkeys(_TARGETS, "0.31 (0.25..0.5)")
 
-_FIGURES = (
+FIGURES = (
     Column("plane_mean_abs_mm", "plane, mean deviation [mm]", 3, _MEAN),
     Column("plane_rms_mm", "plane, RMS [mm]", 3, _STATED),
     Column("flatness_mm", "flatness [mm]", 3, _STATED),
@@ -60,11 +60,12 @@ LAYOUT = Layout(
     "Accuracy of the reconstruction (section 2.5)",
     "Bodies of known shape in several poses, scanned through the estimated calibration: a plane and a plate with two "
     "balls, blank (`white`, `sphere`) and printed with a checkerboard. n counts poses. The paper's only measure is the "
-    "mean deviation from a best-fit plane; flatness, probing error and sphere spacing follow VDI/VDE 2634-2.",
-    (*_FIGURES, *_RATIOS, *_CALIBRATION, *_REST),
+    "mean deviation from a best-fit plane, 0.25 to 0.5 mm for its setups and 0.31 mm for this one: it stands beside every "
+    "figure as a yardstick. Flatness, probing error and sphere spacing follow VDI/VDE 2634-2.",
+    (*FIGURES, *_RATIOS, *_CALIBRATION, *_REST),
     (
         Plot("plane_mean_abs_mm", "plane_mean_abs_mm", "mean deviation from the best-fit plane [mm]", 0.31),
-        Plot("length_error_mm", "length_error_mm", "error of 300 mm, RMS [mm]", 0.31),
+        Plot("length_error_mm", "length_error_mm", "error of 300 mm, RMS [mm]"),
     ),
     (
         Montage(
@@ -87,7 +88,7 @@ LAYOUT = Layout(
             "points; size, spacing and bias are signed. Of the two balls the worse one counts. Lengths run between "
             "printed corners that no calibration has seen.",
             _BODIES,
-            _metrics(_FIGURES),
+            _metrics(FIGURES),
         ),
         Section(
             "Over what noise alone would make",
@@ -105,7 +106,7 @@ LAYOUT = Layout(
             "would have kept is the coverage. The last columns are the calibration's own errors: the camera may be "
             "thought too far away with too long a lens, which changes its z and next to nothing in the world.",
             ("fault/none", "fault/baseline", "fault/focal", "fault/yaw"),
-            _metrics(_FIGURES, _CALIBRATION),
+            _metrics(FIGURES, _CALIBRATION),
         ),
     ),
 )
