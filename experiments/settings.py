@@ -126,6 +126,29 @@ class RigSettings(Checked):
     board_poses: int = count(9, 3, 12)
 
 
+def values_of(key: str, default: list[Any]) -> Any:
+    """Declare a list of values, each of which the key `rig.KEY` must allow."""
+    one = {item.name: item for item in fields(RigSettings)}[key].metadata
+    return setting(
+        default,
+        f"be a list of different values that each {one['allowed']}",
+        lambda values: all(one["holds"](value) for value in values) and len(set(values)) == len(values),
+    )
+
+
+@dataclass
+class AblationSettings(Checked):
+    """What the experiment `ablations` sets the rig's keys to, one at a time; an empty list leaves a key alone."""
+
+    group: ClassVar[str] = "ablations."
+    noise_scale: list[float] = values_of("noise_scale", [0.5, 2.0, 4.0])
+    camera_blur_px: list[float] = values_of("camera_blur_px", [0.5, 1.0, 1.5])
+    baseline_mm: list[float] = values_of("baseline_mm", [213.0, 320.0, 600.0])
+    stripe_width_px: list[int] = values_of("stripe_width_px", [3, 5])
+    gamma: list[float] = values_of("gamma", [1.0, 3.0])
+    ambient: list[float] = values_of("ambient", [0.1, 0.3])
+
+
 @dataclass
 class EngineSettings(Checked):
     """What carries the trials out."""
@@ -192,6 +215,7 @@ class Config(Checked):
     scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
+    ablations: AblationSettings = field(default_factory=AblationSettings)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

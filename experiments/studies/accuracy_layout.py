@@ -60,8 +60,8 @@ LAYOUT = Layout(
     "Accuracy of the reconstruction (section 2.5)",
     "Bodies of known shape in several poses, scanned through the estimated calibration: a plane and a plate with two "
     "balls, blank (`white`, `sphere`) and printed with a checkerboard. n counts poses. The paper's only measure is the "
-    "mean deviation from a best-fit plane, 0.25 to 0.5 mm for its setups and 0.31 mm for this one: it stands beside every "
-    "figure as a yardstick. Flatness, probing error and sphere spacing follow VDI/VDE 2634-2.",
+    "mean deviation from a best-fit plane, 0.25 to 0.5 mm for its setups and 0.31 mm for this one: it stands beside "
+    "every figure as a yardstick. Flatness, probing error and sphere spacing follow VDI/VDE 2634-2.",
     (*FIGURES, *_RATIOS, *_CALIBRATION, *_REST),
     (
         Plot("plane_mean_abs_mm", "plane_mean_abs_mm", "mean deviation from the best-fit plane [mm]", 0.31),

@@ -23,7 +23,7 @@ from experiments.studies.targets import Measured, Target, on_ball
 
 def noise_ratios(
     rig: Rig, target: Target, found: Measured, calibration: Calibration, shown: Mapping[str, float]
-) -> Mapping[str, float]:
+) -> dict[str, float]:
     """Return each figure over what noise alone makes of it.
 
     Parameters

@@ -40,11 +40,14 @@ ROOT = Path(__file__).resolve().parents[2]
         ("rig.stripe_width_px=2", ("`rig.stripe_width_px`", "odd whole number in [1, 15]", "2")),
         ("rig.baseline_mm=50", ("`rig.baseline_mm`", "[100, 700] mm", "50")),
         ("rig.camera_blur_px=nan", ("`rig.camera_blur_px`", "[0.3, 3]", "nan")),
+        ("ablations.gamma=[1,9]", ("`ablations.gamma`", "each lie in [0.5, 4]", "[1.0, 9.0]")),
+        ("ablations.ambient=[0.1,0.1]", ("`ablations.ambient`", "different values", "[0.1, 0.1]")),
+        ("ablations.stripe_width_px=[4]", ("`ablations.stripe_width_px`", "odd whole number", "[4]")),
         ("rig.gamma=0", ("`rig.gamma`", "[0.5, 4]", "0")),
         ("rig.ambient=-0.1", ("`rig.ambient`", "[0, 1]", "-0.1")),
         ("scan.ink=some", ("`scan.ink`", "true or false", "got some")),
         ("mesh.rows=1", ("`mesh.rows`", "[2, 1000]", "1")),
-        ("colour=red", ("`colour`", "one of budget, engine, experiment")),
+        ("colour=red", ("`colour`", "one of ablations, budget, engine, experiment")),
         ("+x=1", ("`x`", "existing key", "+x=1")),
         ("++seed=3", ("`seed`", "++seed=3")),
         ("~seed", ("`seed`", "~seed")),
@@ -55,13 +58,16 @@ ROOT = Path(__file__).resolve().parents[2]
         ("engine=ray", ("`engine`", "processes, serial", "'ray'")),
         ("engine=slurm", ("`engine`", "processes, serial", "'slurm'")),
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
-        ("experiment=stiffness", ("`experiment`", "corner_distance, fake, plane_accuracy, real_boards", "'stiffness'")),
+        (
+            "experiment=stiffness",
+            ("`experiment`", "ablations, corner_distance, fake, plane_accuracy, real_boards", "'stiffness'"),
+        ),
         ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
         ("trials", ("`trials`", "KEY=VALUE")),
         ("--nonsense", ("--nonsense", "KEY=VALUE")),
         ("out=/dev/null/x", ("`out`", "/dev/null/x")),
         (f"out=new/{'y' * 300}", ("`out`", "yyy", "too long")),
-        ("experiment=null", ("`experiment`", "corner_distance, fake", "got null")),
+        ("experiment=null", ("`experiment`", "ablations, corner_distance, fake", "got null")),
         ("experiment=1", ("`experiment`", "got 1")),
         ("experiment=[fake,fake]", ("`experiment`", "got [fake,fake]")),
         ("engine=null", ("`engine`", "processes, serial", "got null")),
@@ -214,7 +220,7 @@ def test_without_an_experiment_the_program_lists_them(capsys: pytest.CaptureFixt
     assert main([]) == 2
     error = capsys.readouterr().err
     assert error.splitlines() == [
-        "`experiment` must be one of corner_distance, plane_accuracy, real_boards, got nothing."
+        "`experiment` must be one of ablations, corner_distance, plane_accuracy, real_boards, got nothing."
     ]
 
 
