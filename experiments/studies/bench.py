@@ -13,7 +13,7 @@ from deskew.acquisition import SweepSettings
 from deskew.types import Calibration
 from experiments.settings import Config, RigSettings
 
-# Random numbers of the calibration shots: a trial's number that no trial has.
+# Random numbers of the calibration shots: a trial's number that no trial has, nor have those below it.
 _CALIBRATION = 2**32 - 1
 
 
@@ -44,10 +44,10 @@ def configured_rig(settings: RigSettings) -> Rig:
     return replace(rig, config=config)
 
 
-def calibrated_bench(config: Config) -> Bench:
-    """Photograph the printed board in its poses and calibrate both devices from that."""
+def calibrated_bench(config: Config, draw: int = 0) -> Bench:
+    """Photograph the printed board in its poses and calibrate both devices from that; `draw` picks other noise."""
     rig = configured_rig(config.rig)
-    rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION]))
+    rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION - draw]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
     return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, sweep=SweepSettings(mode=config.scan.mode)))

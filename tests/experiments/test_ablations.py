@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from deskew.errors import StepError
 from deskew.types import Calibration
-from experiments.settings import AblationSettings, Config, ScanSettings
+from experiments.settings import AblationSettings, BudgetSettings, Config, ScanSettings
 from experiments.studies import ablations
 from experiments.studies.bench import Bench, configured_rig
 from experiments.trials import TrialKey
@@ -24,13 +26,16 @@ def test_every_value_is_planned_beside_the_default_in_every_pose() -> None:
     conditions = ["default", "noise_scale=0.5", "noise_scale=2", "stripe_width_px=3"]
     assert [(key.condition, key.trial) for key in keys] == [(name, trial) for name in conditions for trial in (0, 1)]
     assert [key.condition for key in ablations.Ablations().plan(config())] == ["default"] * 2
+    smoke = replace(config(noise_scale=[0.5, 2.0]), budget=BudgetSettings("smoke"))
+    assert {key.condition for key in ablations.Ablations().plan(smoke)} == {"default", "noise_scale=0.5"}
 
 
 def test_one_key_is_changed_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Config] = []
 
-    def calibrated(changed: Config) -> Bench:
+    def calibrated(changed: Config, draw: int) -> Bench:
         seen.append(changed)
+        assert draw == 0
         raise StepError("no board")
 
     monkeypatch.setattr(ablations, "calibrated_bench", calibrated)
@@ -59,7 +64,7 @@ def test_settings_reach_the_rig() -> None:
 
 
 def test_a_wide_stripe_is_scanned_on_every_body(monkeypatch: pytest.MonkeyPatch) -> None:
-    def known(changed: Config) -> Bench:
+    def known(changed: Config, draw: int) -> Bench:
         rig = configured_rig(changed.rig)
         residuals = {f"{name}_rms_px": 0.0 for name in ("camera", "projector")}
         return Bench(rig, Calibration(rig.camera, rig.projector, residuals))
