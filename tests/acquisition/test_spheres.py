@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from deskew.acquisition.accuracy import flatness_mm, plane_deviation, retained
 from deskew.acquisition.spheres import Sphere, fit_sphere, probe_sphere, spacing_error_mm
-from deskew.errors import InputError
+from deskew.errors import InputError, StepError
 
 CENTRE = np.array([40.0, -30.0, 12.0])
 
@@ -97,6 +97,12 @@ def test_exactly_the_largest_residuals_go():
     keep = retained(np.array([0.1, -5.0, 0.3, 4.0, -0.2]), 0.4)
     assert keep.tolist() == [True, False, True, False, True]
     assert retained(np.arange(5.0), 0.0).all()
+
+
+def test_a_saddle_has_no_best_sphere():
+    x, y = np.random.default_rng(0).uniform(-50, 50, (2, 200))
+    with pytest.raises(StepError, match="too little of a sphere"):
+        fit_sphere(np.column_stack([x, y, (x**2 - y**2) / 100]))
 
 
 def test_what_is_no_ball_is_refused():
