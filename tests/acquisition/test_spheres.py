@@ -99,10 +99,11 @@ def test_exactly_the_largest_residuals_go():
     assert retained(np.arange(5.0), 0.0).all()
 
 
-def test_a_saddle_has_no_best_sphere():
-    x, y = np.random.default_rng(0).uniform(-50, 50, (2, 200))
-    with pytest.raises(StepError, match="too little of a sphere"):
-        fit_sphere(np.column_stack([x, y, (x**2 - y**2) / 100]))
+def test_what_curves_as_much_up_as_down_has_no_best_sphere():
+    x, y = (steps.ravel() for steps in np.meshgrid(np.linspace(-50, 50, 15), np.linspace(-50, 50, 15)))
+    for height in ((x**2 - y**2) / 100, x * y / 100):
+        with pytest.raises(StepError, match="too little of a sphere"):
+            fit_sphere(np.column_stack([x, y, height]))
 
 
 def test_what_is_no_ball_is_refused():
