@@ -100,8 +100,8 @@ LAYOUT = Layout(
         ),
         Section(
             "What each figure sees of a wrong calibration",
-            "The same photographs of the blank plane, the printed plane's corners and the blank balls through a "
-            "calibration made wrong on purpose: baseline + 1 %, camera's focal lengths + 1 %, projector turned by 0.1 "
+            "The photographs of the first three poses again (blank plane, corners of the printed plane, blank balls) "
+            "through a calibration made wrong on purpose: baseline + 1 %, camera's focal lengths + 1 %, projector turned by 0.1 "
             "degrees. A figure that stays is blind to that fault. All pixels are used, whatever culling says; what it "
             "would have kept is the coverage. The last columns are the calibration's own errors: the camera may be "
             "thought too far away with too long a lens, which changes its z and next to nothing in the world.",
