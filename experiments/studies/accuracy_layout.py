@@ -101,11 +101,11 @@ LAYOUT = Layout(
         Section(
             "What each figure sees of a wrong calibration",
             "The photographs of the first three poses again (blank plane, corners of the printed plane, blank balls) "
-            "through a calibration made wrong on purpose: baseline + 1 %, camera's focal lengths + 1 %, projector turned "
-            "by 0.1 degrees. A figure that stays is blind to that fault. All pixels are used, whatever culling says; what "
-            "it would have kept is the coverage. The last columns are the calibration's own errors: a camera that is "
-            "thought too far away (negative) with too long a lens sees the same, so its z changes and next to nothing in "
-            "the world does.",
+            "through a calibration made wrong on purpose: baseline + 1 %, camera's focal lengths + 1 %, projector "
+            "turned by 0.1 degrees. A figure that stays is blind to that fault. All pixels are used, whatever "
+            "culling says; what it would have kept is the coverage. The last columns are the calibration's own "
+            "errors: a camera that is thought too far away (negative) with too long a lens sees the same, so its z "
+            "changes and next to nothing in the world does.",
             ("fault/none", "fault/baseline", "fault/focal", "fault/yaw"),
             _metrics(FIGURES, _CALIBRATION),
         ),
