@@ -3,6 +3,7 @@
 It shares no mathematics with the reconstruction, so that a common error cannot cancel.
 """
 
+from data_synth.balls import BallPlate, ball_plate
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
 from data_synth.lettering import glyph, pseudo_words
@@ -18,6 +19,7 @@ from data_synth.truth import Truth
 __all__ = [
     "BOARD",
     "PAGE_SIZE_MM",
+    "BallPlate",
     "Blank",
     "BoardPose",
     "Checkerboard",
@@ -32,6 +34,7 @@ __all__ = [
     "TrueSheet",
     "Truth",
     "View",
+    "ball_plate",
     "board_page",
     "board_poses",
     "crumpled",

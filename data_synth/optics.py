@@ -40,22 +40,25 @@ def margin_px(sigma_px: float) -> int:
     return math.ceil((len(psf_taps(sigma_px)) // 2 - 1) / SUBSAMPLES)
 
 
-def line_profile(sigma_px: float) -> Floats:
-    """Light at a distance from a lit projector line: its unit box blurred by a Gaussian, so all lines add up to 1.
+def line_profile(sigma_px: float, width_px: int = 1) -> Floats:
+    """Light at a distance from the middle of a lit stripe: a box blurred by a Gaussian; single lines add up to 1.
 
     Parameters
     ----------
     sigma_px : float
         Blur [projector px].
+    width_px : int
+        Lines that are lit together.
 
     Returns
     -------
     (n,) float32 array
         Light at distances 0, 1 / PROFILE_STEPS, ... up to where it ends, 4 sigma beyond the box.
     """
-    reach = 0.5 + 4 * sigma_px
+    half = width_px / 2
+    reach = half + 4 * sigma_px
     distance = np.arange(math.ceil(reach * PROFILE_STEPS) + 2) / PROFILE_STEPS
-    light = ndtr((distance + 0.5) / sigma_px) - ndtr((distance - 0.5) / sigma_px)
+    light = ndtr((distance + half) / sigma_px) - ndtr((distance - half) / sigma_px)
     light[-1] = 0.0
     return np.asarray(light, dtype=np.float32)
 

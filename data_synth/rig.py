@@ -9,6 +9,11 @@ import numpy as np
 from deskew.errors import require, require_whole
 from deskew.types import Floats, Pinhole, Size
 
+BASELINE_MM = 426.0
+"""Distance of projector and camera along X in the default rig."""
+
+_CAMERA_AT = (6.0, -5.0, 800.0)
+
 
 @dataclass(frozen=True, slots=True)
 class RigConfig:
@@ -20,6 +25,8 @@ class RigConfig:
         Gaussian blur of the lens, camera pixels.
     projector_blur_sigma_px : float
         Gaussian blur of the projector's image, projector pixels.
+    stripe_width_px : int
+        Neighbouring projector lines that a frame of a sweep lights, odd: frame i is centred on line i.
     projector_gamma : float
         Light of a code c is ``(c / 255) ** gamma`` of full light.
     projector_code : int
@@ -55,6 +62,7 @@ class RigConfig:
 
     camera_psf_sigma_px: float = 0.75
     projector_blur_sigma_px: float = 0.6
+    stripe_width_px: int = 1
     projector_gamma: float = 2.2
     projector_code: int = 235
     driver_gamma: float = 2.2
@@ -88,6 +96,8 @@ class RigConfig:
             value = getattr(self, name)
             require(low <= value <= high, name, f"be in [{low}, {high}]", value)
         require_whole("exposures", self.exposures, 1, 256)
+        odd = self.stripe_width_px in range(1, 16, 2)
+        require(odd, "stripe_width_px", "be an odd whole number in [1, 15]", self.stripe_width_px)
 
     @property
     def lit(self) -> float:
@@ -157,19 +167,29 @@ def look_at(
 def default_camera() -> Pinhole:
     """640 x 480 at 800 mm, 0.475 mm/px on the bed, barrel distortion of about 2 px in the corners."""
     K = np.array([[1684.0, 0.0, 324.6], [0.0, 1685.5, 236.2], [0.0, 0.0, 1.0]])
-    return look_at((640, 480), K, (-0.09, 0.12, 4e-4, -3e-4, 0.0), (6.0, -5.0, 800.0), (2.2, 1.8))
+    return look_at((640, 480), K, (-0.09, 0.12, 4e-4, -3e-4, 0.0), _CAMERA_AT, (2.2, 1.8))
 
 
-def default_projector() -> Pinhole:
+def default_projector(baseline_mm: float = BASELINE_MM) -> Pinhole:
     """1024 x 768 from the right at about 23 degrees, 0.33 mm/px on the bed, lens shift beyond the frame's edge.
 
     The frame covers the page up to 60 mm above the bed. Its optical axis meets the bed in front of the page, as a
     table-top projector's does, so the principal point lies below the last row.
+
+    Parameters
+    ----------
+    baseline_mm : float
+        Distance to the camera along X, in [100, 700]. The projector moves on a circle about the place that it is aimed
+        at, so it lights as much of the bed, as finely, from wherever it stands.
     """
+    require(100 <= baseline_mm <= 700, "baseline_mm", "be in [100, 700]", baseline_mm)
     K = np.array([[3276.0, 0.0, 511.3], [0.0, 3273.0, 837.0], [0.0, 0.0, 1.0]])
-    return look_at((1024, 768), K, (0.035, -0.02, -3e-4, 5e-4, 0.0), (432.0, -135.0, 985.0), (-9.0, -135.0))
+    axis_at, distance_mm = (-9.0, -135.0), np.hypot(441.0, 985.0)
+    x = _CAMERA_AT[0] + baseline_mm
+    eye = (x, axis_at[1], float(np.sqrt(distance_mm**2 - (x - axis_at[0]) ** 2)))
+    return look_at((1024, 768), K, (0.035, -0.02, -3e-4, 5e-4, 0.0), eye, axis_at)
 
 
-def default_rig(noise_scale: float = 1.0) -> Rig:
+def default_rig(noise_scale: float = 1.0, *, baseline_mm: float = BASELINE_MM) -> Rig:
     """Return the bench of every experiment; `noise_scale` multiplies the sensor's noise."""
-    return Rig(default_camera(), default_projector(), RigConfig(noise_scale=noise_scale))
+    return Rig(default_camera(), default_projector(baseline_mm), RigConfig(noise_scale=noise_scale))

@@ -86,7 +86,11 @@ class _Painter:
         coordinate, light = sweep.coordinate, sweep.light
         if not sweep.upright:
             coordinate, light = np.ascontiguousarray(coordinate.T), np.ascontiguousarray(light.T)
-        profile, taps = line_profile(sweep.config.projector_blur_sigma_px), psf_taps(sweep.config.camera_psf_sigma_px)
+        config = sweep.config
+        profile, taps = (
+            line_profile(config.projector_blur_sigma_px, config.stripe_width_px),
+            psf_taps(config.camera_psf_sigma_px),
+        )
         reach = len(profile) / PROFILE_STEPS
         starts, places, values = _sorted_by_line(coordinate, light, sweep.n_lines, reach)
         read, shot = sweep.config.noise_variance

@@ -105,11 +105,48 @@ class PageSettings(Checked):
 
 @dataclass
 class RigSettings(Checked):
-    """The synthetic rig."""
+    """The synthetic rig; every key can be swept.
+
+    `camera_blur_px`: standard deviation of the lens's blur.
+    `baseline_mm`: distance of projector and camera along X; the projector moves on a circle about where it is aimed.
+    `stripe_width_px`: neighbouring projector lines that a frame lights; the blur of the projector's lens stays.
+    `gamma`: of the projector; as lines are lit below full code it also decides how bright they are.
+    `ambient`: light of an even sky.
+    """
 
     group: ClassVar[str] = "rig."
     noise_scale: float = number(1.0, 0.0, 10.0, "times the rig's own noise")
+    camera_blur_px: float = number(0.75, 0.3, 3.0, "camera pixels")
+    baseline_mm: float = number(426.0, 100.0, 700.0, "mm")
+    stripe_width_px: int = setting(
+        1, "be an odd whole number in [1, 15] of projector lines", lambda value: value in range(1, 16, 2)
+    )
+    gamma: float = number(2.2, 0.5, 4.0)
+    ambient: float = number(0.03, 0.0, 1.0, "times the projector's full light")
     board_poses: int = count(9, 3, 12)
+
+
+def values_of(key: str, default: list[Any]) -> Any:
+    """Declare a list of values, each of which the key `rig.KEY` must allow."""
+    one = {item.name: item for item in fields(RigSettings)}[key].metadata
+    return setting(
+        default,
+        f"be a list of different values that each {one['allowed']}",
+        lambda values: all(one["holds"](value) for value in values) and len(set(values)) == len(values),
+    )
+
+
+@dataclass
+class AblationSettings(Checked):
+    """What the experiment `ablations` sets the rig's keys to, one at a time; an empty list leaves a key alone."""
+
+    group: ClassVar[str] = "ablations."
+    noise_scale: list[float] = values_of("noise_scale", [0.5, 2.0, 4.0])
+    camera_blur_px: list[float] = values_of("camera_blur_px", [0.5, 1.0, 1.5])
+    baseline_mm: list[float] = values_of("baseline_mm", [213.0, 320.0, 600.0])
+    stripe_width_px: list[int] = values_of("stripe_width_px", [3, 5])
+    gamma: list[float] = values_of("gamma", [1.0, 3.0])
+    ambient: list[float] = values_of("ambient", [0.1, 0.3])
 
 
 @dataclass
@@ -191,6 +228,7 @@ class Config(Checked):
     mesh: MeshSettings = field(default_factory=MeshSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
+    ablations: AblationSettings = field(default_factory=AblationSettings)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

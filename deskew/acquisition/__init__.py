@@ -1,10 +1,12 @@
 """From a capture to a depth map and a mesh (section 2): corners, calibration, decoding, culling, triangulation."""
 
 from deskew.acquisition.accuracy import (
+    DISCARDED_SHARE,
     PlaneDeviation,
     average_deviation,
     depth_points,
     fit_plane,
+    flatness_mm,
     length_errors,
     plane_deviation,
 )
@@ -24,10 +26,12 @@ from deskew.acquisition.matches import require_same_devices
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, page_outline, straight_outline
 from deskew.acquisition.phase import PhaseSettings, decode_phase
+from deskew.acquisition.spheres import Probing, Sphere, fit_sphere, probe_sphere, spacing_error_mm
 from deskew.acquisition.stripes import decode_sweep
 from deskew.acquisition.sweep import SweepSettings
 
 __all__ = [
+    "DISCARDED_SHARE",
     "BoardView",
     "DecoderSettings",
     "DenoiseSettings",
@@ -38,6 +42,8 @@ __all__ = [
     "PageMesh",
     "PhaseSettings",
     "PlaneDeviation",
+    "Probing",
+    "Sphere",
     "SweepSettings",
     "average_deviation",
     "board_points",
@@ -53,16 +59,20 @@ __all__ = [
     "depth_points",
     "find_board",
     "fit_plane",
+    "fit_sphere",
+    "flatness_mm",
     "kitchen_rosenfeld_peaks",
     "length_errors",
     "page_mesh",
     "page_outline",
     "page_sheet",
     "plane_deviation",
+    "probe_sphere",
     "refine_kitchen_rosenfeld",
     "refine_saddle",
     "require_same_devices",
     "settings_for_ink",
+    "spacing_error_mm",
     "straight_outline",
     "view_board",
 ]

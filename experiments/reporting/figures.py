@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from statistics import median
+from textwrap import wrap
 
 import cv2
 import numpy as np
@@ -74,6 +75,8 @@ def picture_wall(montage: Montage, pictures: Mapping[str, bytes], n_trials_max: 
                 axes.set_ylabel(heading, fontsize=9)
             if line == 0:
                 axes.set_title(f"{montage.item} {trial + 1}", fontsize=9)
+    if montage.caption:
+        figure.supxlabel("\n".join(wrap(montage.caption, int(14 * size[0]))), fontsize=8)
     return figure
 
 

@@ -73,11 +73,34 @@ class Montage:
         The trial's number stands for "{trial}" in the picture's name.
     item : str
         What a trial shows: "page 1", ...
+    caption : str
+        Written under it; "" for none.
     """
 
     name: str
     lines: tuple[tuple[str, str], ...]
     item: str = "page"
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of the summary: some conditions by some metrics.
+
+    Attributes
+    ----------
+    title, note : str
+        Heading and the sentences under it.
+    conditions : tuple of str
+        A line each, in this order; one without data has none.
+    metrics : tuple of str
+        A column each, in the layout's order; one without data has none.
+    """
+
+    title: str
+    note: str
+    conditions: tuple[str, ...]
+    metrics: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +137,8 @@ class Layout:
         The figures.
     montages : tuple of Montage
         Figures of pictures; a picture in one of them is not written by itself.
+    sections : tuple of Section
+        Parts of the summary, instead of one table of all conditions by the headline metrics.
     times, profile : Times or None
         Of a study of speed: what heads `table.md`, and what is written as `profile.md`.
     """
@@ -123,5 +148,6 @@ class Layout:
     columns: tuple[Column, ...]
     plots: tuple[Plot, ...] = ()
     montages: tuple[Montage, ...] = ()
+    sections: tuple[Section, ...] = ()
     times: Times | None = None
     profile: Times | None = None

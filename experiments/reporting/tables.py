@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
 
-from experiments.reporting.layout import Column, Layout, Times
+from experiments.reporting.layout import Column, Layout, Section, Times
 from experiments.reporting.statistics import share_interval, summarise
 from experiments.trials.schema import Failure, Row
 
@@ -41,14 +41,18 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timi
     parts = [f"# {layout.title}", layout.note]
     if layout.times is not None:
         parts += [f"## {layout.times.title}", layout.times.note, _times(layout.times, timings)]
-    if any(column.headline for column in layout.columns):
+    headlines = [column for column in layout.columns if column.headline]
+    if headlines or layout.sections:
         parts += [
             "## Summary",
             "Mean over the trials (of root mean squares the pooled one) with its 95 % bootstrap interval; shares with "
             "Wilson's, a failed trial counting against them.",
-            _headlines(layout, rows),
         ]
-    if len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
+    if headlines:
+        parts.append(_headlines(headlines, _by_place(rows)))
+    for section in layout.sections:
+        parts += [f"### {section.title}", section.note, _section(layout, section, rows)]
+    if not layout.sections and len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
         parts += ["## Each trial", _each_trial(layout, rows)]
     parts += ["## All trials", _all_trials(layout, rows)]
     if failures:
@@ -110,11 +114,19 @@ def _by_place(rows: Sequence[Row]) -> dict[Place, dict[str, list[float]]]:
     return dict(sorted(values.items()))
 
 
-def _headlines(layout: Layout, rows: Sequence[Row]) -> str:
-    """Return a line a condition and method, a column a headline metric, the paper's figures below."""
-    columns = [column for column in layout.columns if column.headline]
+def _section(layout: Layout, section: Section, rows: Sequence[Row]) -> str:
+    """Return a part of the summary: its own conditions in their order, and those of its columns that have data."""
+    order = {condition: place for place, condition in enumerate(section.conditions)}
+    places = _by_place([row for row in rows if row.condition in order])
+    measured = {metric for metrics in places.values() for metric in metrics}
+    columns = [column for column in layout.columns if column.metric in measured.intersection(section.metrics)]
+    return _headlines(columns, dict(sorted(places.items(), key=lambda item: (order[item[0][0]], item[0][1]))))
+
+
+def _headlines(columns: Sequence[Column], places: Mapping[Place, Mapping[str, Sequence[float]]]) -> str:
+    """Return a line a condition and method, a column a metric, the paper's figures below."""
     lines = []
-    for (condition, method), metrics in _by_place(rows).items():
+    for (condition, method), metrics in places.items():
         if not any(column.metric in metrics for column in columns) and "failed" not in metrics:
             continue
         counts = [len(metrics[column.metric]) for column in columns if column.metric in metrics]

@@ -9,6 +9,7 @@ from experiments.studies.study import AbsentError, Study
 # name of the experiment: module and class; `conf/experiment/NAME.yaml` goes with each.
 STUDIES = {
     "plane_accuracy": "experiments.studies.plane_accuracy:PlaneAccuracy",
+    "ablations": "experiments.studies.ablations:Ablations",
     "corner_distance": "experiments.studies.corner_distance:CornerDistance",
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",

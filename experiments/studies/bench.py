@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,9 +11,9 @@ from data_synth import Rig
 from deskew import pipeline
 from deskew.acquisition import SweepSettings
 from deskew.types import Calibration
-from experiments.settings import Config
+from experiments.settings import Config, RigSettings
 
-# Random numbers of the calibration shots: a trial's number that no trial has.
+# Random numbers of the calibration shots: a trial's number that no trial has, nor have those below it.
 _CALIBRATION = 2**32 - 1
 
 
@@ -44,10 +44,23 @@ def calibration_figures(calibration: Calibration, unit: str) -> dict[str, float]
     return figures if length is None else figures | {f"calib_held_out_length_rms_{unit}": length}
 
 
-def calibrated_bench(config: Config) -> Bench:
-    """Photograph the printed board in its poses and calibrate both devices from that."""
-    rig = data_synth.default_rig(config.rig.noise_scale)
-    rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION]))
+def configured_rig(settings: RigSettings) -> Rig:
+    """Return the rig that the configuration asks for."""
+    rig = data_synth.default_rig(settings.noise_scale, baseline_mm=settings.baseline_mm)
+    config = replace(
+        rig.config,
+        camera_psf_sigma_px=settings.camera_blur_px,
+        stripe_width_px=settings.stripe_width_px,
+        projector_gamma=settings.gamma,
+        ambient=settings.ambient,
+    )
+    return replace(rig, config=config)
+
+
+def calibrated_bench(config: Config, draw: int = 0) -> Bench:
+    """Photograph the printed board in its poses and calibrate both devices from that; `draw` picks other noise."""
+    rig = configured_rig(config.rig)
+    rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION - draw]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
     return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, settings=SweepSettings(mode=config.scan.mode)))

@@ -79,6 +79,26 @@ def test_the_projector_covers_the_page_and_the_desk_around_it_up_to_60_mm() -> N
         assert (pixels.max(axis=0) < np.array(projector.size) - 1).all()
 
 
+@pytest.mark.parametrize("baseline", [100.0, 213.0, 426.0, 700.0])
+def test_a_baseline_turns_the_projector_about_the_place_it_is_aimed_at(baseline: float) -> None:
+    rig, default = ds.default_rig(baseline_mm=baseline), ds.default_rig()
+    eye = centre(rig.projector)
+    assert (eye - centre(rig.camera))[0] == pytest.approx(baseline)
+    aim = np.array([-9.0, -135.0, 0.0])
+    assert np.linalg.norm(eye - aim) == pytest.approx(np.linalg.norm(centre(default.projector) - aim))
+    axis = np.array(rig.projector.R[2])
+    assert np.allclose(eye + axis * np.linalg.norm(eye - aim), aim)
+    assert np.array_equal(rig.projector.K, default.projector.K)
+    if baseline == 426.0:
+        assert eye == pytest.approx([432.0, -135.0, 985.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("baseline", [99.0, 701.0, np.nan])
+def test_a_baseline_out_of_range_is_refused(baseline: float) -> None:
+    with pytest.raises(InputError, match=r"`baseline_mm` must be in \[100, 700\]"):
+        ds.default_rig(baseline_mm=baseline)
+
+
 def test_skewed_devices_are_refused() -> None:
     K = default_camera().K.copy()
     K[0, 1] = 2.0

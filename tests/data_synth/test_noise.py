@@ -10,6 +10,7 @@ import pytest
 import data_synth as ds
 from data_synth.noise import deviations, expose, quantile_table
 from data_synth.optics import PROFILE_STEPS, blurred, frame_window, line_profile, margin_px, psf_taps
+from deskew.errors import InputError
 from deskew.types import Floats
 
 N = 40_000
@@ -99,6 +100,23 @@ def test_lines_add_up_to_the_whole_frame() -> None:
         assert np.allclose(total, frame_window(coordinates, 20, sigma), atol=2e-4)
         # Variance of the blurred unit box.
         assert 2 * np.trapezoid(profile * distance**2, distance) == pytest.approx(sigma**2 + 1 / 12, rel=2e-3)
+
+
+@pytest.mark.parametrize("width", [1, 3, 7])
+def test_a_wide_stripe_is_the_sum_of_its_lines(width: int) -> None:
+    line, stripe = line_profile(0.6), line_profile(0.6, width)
+    distance = np.arange(len(stripe)) / PROFILE_STEPS
+    neighbours = np.arange(width) - width // 2
+    total = sum(
+        np.interp(np.abs(distance - k), np.arange(len(line)) / PROFILE_STEPS, line, right=0) for k in neighbours
+    )
+    assert np.allclose(stripe, total, atol=2e-4)
+
+
+@pytest.mark.parametrize("width", [0, 2, 17])
+def test_a_stripe_has_a_middle_line(width: int) -> None:
+    with pytest.raises(InputError, match="`stripe_width_px` must be an odd whole number"):
+        replace(ds.RigConfig(), stripe_width_px=width)
 
 
 def test_the_point_spread_keeps_light_and_place() -> None:

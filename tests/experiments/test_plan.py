@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.settings import Config, RealBoardsSettings, SheetSettings, allowed_text, known_keys
+from experiments.settings import AblationSettings, Config, RealBoardsSettings, SheetSettings, allowed_text, known_keys
 from experiments.trials import fingerprint, plan, settings_of
 
 CONFIG = Config(experiment="fake", trials=3)
@@ -60,6 +60,11 @@ def test_one_name_and_a_list_of_one_are_the_same_methods() -> None:
 
 def test_a_section_of_another_experiment_is_no_part() -> None:
     other = replace(CONFIG, real_boards=RealBoardsSettings("somewhere"))
+    assert settings_of(other, {}) == settings_of(CONFIG, {})
+
+
+def test_a_longer_list_of_ablations_leaves_old_rows_good() -> None:
+    other = replace(CONFIG, ablations=AblationSettings(gamma=[1.0]))
     assert settings_of(other, {}) == settings_of(CONFIG, {})
 
 

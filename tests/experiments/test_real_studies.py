@@ -47,7 +47,8 @@ def test_corner_distance_measures_every_condition_by_both_detectors(tmp_path: Pa
         *((f"restored{d}", method) for d in ("", "/saddle") for method in ("paper_euler", "paper_rk4")),
     }
     assert rows["control", "-"].keys() == CORNERS | {"detector_rms_px"}
-    assert rows["unrestored", "-"].keys() == CORNERS | CALIBRATION | DEPTH | SHEET | {"meets_paper"}
+    mesh = {"mesh_filled_fraction", "mesh_cut_quads"}
+    assert rows["unrestored", "-"].keys() == CORNERS | CALIBRATION | DEPTH | SHEET | mesh | {"meets_paper"}
     assert rows["restored/saddle", "paper_rk4"].keys() == CORNERS | {"meets_paper"}
     more = {"dense_mean_mm", "dense_p95_mm", "dense_max_mm", "page_coverage", "at_rest", "steps", "steps_rejected"}
     more |= {"force_evaluations", "contacts", "strain_rms", "flips", "folded_quads", "meets_paper"}
@@ -57,14 +58,40 @@ def test_corner_distance_measures_every_condition_by_both_detectors(tmp_path: Pa
     assert (tmp_path / "out" / "figures" / "pages.png").is_file()
 
 
-def test_plane_accuracy_measures_planes_and_lengths(tmp_path: Path) -> None:
+def test_accuracy_measures_every_body_and_looks_through_every_fault(tmp_path: Path) -> None:
     rows = run(tmp_path / "out", "experiment=plane_accuracy", "seed=4712")
-    assert set(rows) == {("white", "-"), ("checkered", "-")}
-    plane = {"plane_mean_abs_mm", "plane_rms_mm", "plane_max_mm", "tilt_deg"} | CALIBRATION | DEPTH | SHEET
-    assert rows["white", "-"].keys() == plane
-    assert rows["checkered", "-"].keys() == plane | {"length_error_mm"}
-    assert 0.0 < rows["checkered", "-"]["length_error_mm"] < 0.1
-    assert 0.005 < rows["white", "-"]["plane_mean_abs_mm"] < 0.05
+    bodies = ("white", "checkered", "sphere", "sphere/checkered")
+    faults = ("fault/none", "fault/baseline", "fault/focal", "fault/yaw")
+    assert set(rows) == {(condition, "-") for condition in (*bodies, *faults)}
+    every = {"tilt_deg", "bound_depth_mm", "depth_rms_ratio", "depth_raw_bias_mm"} | CALIBRATION | DEPTH | SHEET
+    plane = {f"plane_{name}_mm" for name in ("mean_abs", "rms", "max")} | {"flatness_mm"}
+    ball = {"probing_form_mm", "probing_size_mm", "sphere_spacing_error_mm"}
+    ball_ratios = {"probed_points", "probing_form_ratio", "probing_size_ratio", "sphere_spacing_ratio"}
+    length = {"length_error_mm", "length_error_max_mm", "lengths", "length_error_ratio"}
+    assert rows["white", "-"].keys() == every | plane | {"plane_rms_ratio", "flatness_ratio"}
+    assert rows["checkered", "-"].keys() == rows["white", "-"].keys() | length
+    assert rows["sphere", "-"].keys() == rows["sphere/checkered", "-"].keys() == every | ball | ball_ratios
+    white, checkered, sphere = (rows[condition, "-"] for condition in bodies[:3])
+    assert 0.0 < checkered["length_error_mm"] < 0.1
+    assert 0.005 < white["plane_mean_abs_mm"] < 0.05
+    assert 0.9 < white["plane_rms_ratio"] < 4.0
+    assert 0.03 < sphere["probing_form_mm"] < 0.3
+    assert abs(sphere["sphere_spacing_error_mm"]) < 0.1
+
+    # What the table is for: the plane is blind to a wrong baseline, and what knows a length is not.
+    none, baseline, focal, yaw = (rows[condition, "-"] for condition in faults)
+    assert none["plane_rms_mm"] == white["plane_rms_mm"]
+    assert baseline["plane_rms_mm"] == pytest.approx(none["plane_rms_mm"], rel=0.03)
+    assert baseline["sphere_spacing_error_mm"] == pytest.approx(1.5, abs=0.1)
+    assert baseline["probing_size_mm"] == pytest.approx(0.6, abs=0.1)
+    assert 2.7 < baseline["length_error_mm"] < 3.3
+    assert 7.0 < baseline["depth_raw_bias_mm"] < 9.0
+    assert baseline["calib_camera_centre_error_mm"] == none["calib_camera_centre_error_mm"]
+    assert focal["calib_camera_focal_error_px"] - none["calib_camera_focal_error_px"] == pytest.approx(16.84, abs=0.1)
+    assert 2 * focal["depth_coverage"] < 1.6 * none["depth_coverage"]
+    assert min(focal["plane_rms_mm"], yaw["plane_rms_mm"]) > 1.5 * none["plane_rms_mm"]
+    assert abs(yaw["depth_raw_bias_mm"]) > 1.0
+    assert (tmp_path / "out" / "figures" / "depth_error.png").is_file()
 
 
 def test_a_page_that_cannot_be_scanned_fails_each_of_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

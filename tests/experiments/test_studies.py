@@ -89,7 +89,7 @@ def test_real_boards_refuse_other_captures(tmp_path: Path, capsys: pytest.Captur
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", ["corner_distance", "plane_accuracy", "real_boards", "speed"])
+@pytest.mark.parametrize("name", ["ablations", "corner_distance", "plane_accuracy", "real_boards", "speed"])
 def test_every_study_documents_its_conditions(name: str) -> None:
     study = find_study(name)
     assert "Conditions\n" in str(type(study).__doc__)
@@ -106,6 +106,8 @@ def test_every_study_documents_its_conditions(name: str) -> None:
         (["experiment=corner_distance", "sheet.slope_p90_deg=50"], ("`sheet.slope_p90_deg`", "[1, 35]", "50")),
         (["experiment=plane_accuracy", "method=nope"], ("method", "nope")),
         (["experiment=plane_accuracy", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
+        (["experiment=ablations", "method=nope"], ("method", "nope")),
+        (["experiment=ablations", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
         (["experiment=real_boards", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
         (["experiment=real_boards", "trials=6"], ("`trials`", "at most 5", "got 6")),
         (["experiment=real_boards", "real_boards.path=/no/such"], ("`real_boards.path`", "be a folder", "/no/such")),
