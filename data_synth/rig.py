@@ -184,9 +184,9 @@ def default_projector(baseline_mm: float = BASELINE_MM) -> Pinhole:
     """
     require(100 <= baseline_mm <= 700, "baseline_mm", "be in [100, 700]", baseline_mm)
     K = np.array([[3276.0, 0.0, 511.3], [0.0, 3273.0, 837.0], [0.0, 0.0, 1.0]])
-    axis_at, distance_mm = (-9.0, -135.0), np.hypot(441.0, 985.0)
+    axis_at, squared_mm = (-9.0, -135.0), 441.0**2 + 985.0**2
     x = _CAMERA_AT[0] + baseline_mm
-    eye = (x, axis_at[1], float(np.sqrt(distance_mm**2 - (x - axis_at[0]) ** 2)))
+    eye = (x, axis_at[1], float(np.sqrt(squared_mm - (x - axis_at[0]) ** 2)))
     return look_at((1024, 768), K, (0.035, -0.02, -3e-4, 5e-4, 0.0), eye, axis_at)
 
 

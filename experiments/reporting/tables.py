@@ -51,7 +51,7 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timi
     if headlines:
         parts.append(_headlines(headlines, _by_place(rows)))
     for section in layout.sections:
-        parts += [f"### {section.title}", section.note, _section(layout, section, rows)]
+        parts += [f"**{section.title}.** {section.note}", _section(layout, section, rows)]
     if not layout.sections and len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
         parts += ["## Each trial", _each_trial(layout, rows)]
     parts += ["## All trials", _all_trials(layout, rows)]
@@ -124,7 +124,7 @@ def _section(layout: Layout, section: Section, rows: Sequence[Row]) -> str:
 
 
 def _headlines(columns: Sequence[Column], places: Mapping[Place, Mapping[str, Sequence[float]]]) -> str:
-    """Return a line a condition and method, a column a metric, the paper's figures below."""
+    """Return a line a condition and method (if there are any), a column a metric, the paper's figures below."""
     lines = []
     for (condition, method), metrics in places.items():
         if not any(column.metric in metrics for column in columns) and "failed" not in metrics:
@@ -136,7 +136,10 @@ def _headlines(columns: Sequence[Column], places: Mapping[Place, Mapping[str, Se
     paper = [next(iter(column.paper.values()), _NONE) for column in columns]
     if set(paper) != {_NONE}:
         lines.append(["the paper", _NONE, _NONE, _NONE, *paper])
-    return markdown_table(("condition", "method", "n", "failed", *(column.heading for column in columns)), lines)
+    headings = ["condition", "method", "n", "failed", *(column.heading for column in columns)]
+    if all(method == "-" for _, method in places):
+        headings, *lines = ([line[0], *line[2:]] for line in (headings, *lines))
+    return markdown_table(headings, lines)
 
 
 def _headline(column: Column, values: Sequence[float], n_failed: int) -> str:
