@@ -12,6 +12,8 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 SOURCES := deskew data_synth experiments tests
 EXPERIMENTS := plane_accuracy corner_distance real_boards
+# Beyond the paper; they take as long again, so only the largest budget runs them.
+EXPERIMENTS += $(if $(filter full,$(BUDGET)),decoders textures ablations)
 
 # What a run at this budget may overwrite: smoke proves that it runs and never touches the committed reports.
 REPORTS = $(if $(filter smoke,$(BUDGET)),out/smoke,reports)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from deskew.acquisition.leastsquares import levenberg_marquardt
 from deskew.errors import StepError
 from deskew.projection import project, undistort
 from deskew.types import Floats, Pinhole
@@ -27,8 +28,6 @@ _SHARED = 22  # parameters before the poses
 _REJECT_SIGMAS = 4.0
 _REWEIGHTINGS = 3  # the weights settle within them
 _SINGULAR = 1e7  # condition from which a parameter is lost in the rounding of J^T J
-_ITERATIONS = 100
-_RESTS = 1e-6  # gain of a step, in noise variances: no parameter then moves by a 1000th of its deviation
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,58 +259,6 @@ def _solve(start: Bundle, seen: Observations, sigmas: tuple[float, float]) -> tu
 
     solution, steps = levenberg_marquardt(residuals, jacobian, start.packed())
     return start.unpacked(solution), jacobian(solution), steps
-
-
-def levenberg_marquardt(
-    residuals: Callable[[Floats], Floats], jacobian: Callable[[Floats], Floats], start: Floats
-) -> tuple[Floats, int]:
-    """Least squares by damped normal equations, each parameter in its own scale (Marquardt 1963).
-
-    A few dozen parameters against thousands of residuals: forming ``J^T J`` costs a tenth of factoring ``J``, and what
-    its squared condition loses in a step the next step regains.
-
-    Parameters
-    ----------
-    residuals, jacobian : callables of (P,)
-        (N,) residuals in units of their noise, and their (N, P) derivatives.
-    start : (P,) array
-        Where to begin.
-
-    Returns
-    -------
-    (P,) array and int
-        The parameters at rest, and the steps taken.
-
-    Raises
-    ------
-    StepError
-        If the cost still falls after `_ITERATIONS` steps, or is not finite.
-    """
-    x: Floats = start
-    r = residuals(x)
-    damping = 1e-6
-    for taken in range(_ITERATIONS):
-        J = jacobian(x)
-        scale = np.linalg.norm(J, axis=0)
-        scale[scale == 0] = 1.0
-        J /= scale
-        normal, gradient = J.T @ J, J.T @ r
-        while damping < 1e8:
-            step = np.asarray(-np.linalg.lstsq(normal + damping * np.eye(len(x)), gradient, rcond=None)[0] / scale)
-            tried = residuals(x + step)
-            if tried @ tried <= r @ r:
-                break
-            damping *= 10.0
-        else:
-            return x, taken  # no direction lowers the cost any more: it rests to rounding
-        gained = r @ r - tried @ tried
-        x, r, damping = x + step, tried, max(0.1 * damping, 1e-12)
-        if gained < _RESTS:
-            return x, taken + 1
-    raise StepError(
-        f"calibration: the bundle adjustment did not converge in {_ITERATIONS} steps; check the board's shape and "
-        "add poses."
-    )
 
 
 def _grouped_jacobian(residuals: Callable[[Floats], Floats], parameters: Floats, rows: Ints, n_poses: int) -> Floats:
