@@ -9,6 +9,7 @@ import pytest
 
 from deskew import projection
 from deskew.acquisition.fill import fill_depth
+from deskew.acquisition.jumps import depth_jumps
 from deskew.acquisition.mesh import coons_grid, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, straight_outline
 from deskew.errors import InputError, StepError
@@ -171,7 +172,7 @@ def test_hole_limit_below_the_rim_is_refused() -> None:
         page_sheet(depth_map(plane_depth()), straight_outline(CORNERS), max_hole_px=1)
 
 
-def stepped_depth(step_mm: float = 12.0, edge: int = 100) -> Floats:
+def stepped_depth(step_mm: float, edge: int = 100) -> Floats:
     """The plane, its right part lifted towards the camera as by a flap."""
     z = plane_depth()
     z[:, edge:] -= step_mm
@@ -183,8 +184,8 @@ def test_a_jump_cuts_the_mesh_and_nothing_is_interpolated_across_it(gap: int) ->
     """Also where the jump itself lies in a gap of the depth map, as beside a flap's shadow."""
     missing = np.zeros((SIZE[1], SIZE[0]))
     missing[:, 100 : 100 + gap] = 1
-    # Across a gap of four pixels of 2 mm even paper may climb some 30 mm.
-    step = 12.0 if gap == 0 else 60.0
+    # Over a pixel of 2 mm even paper may climb 22 mm, across a gap of four 68.
+    step = 30.0 if gap == 0 else 90.0
     mesh = page_mesh(depth_map(stepped_depth(step), missing), straight_outline(CORNERS), (20, 28))
     assert mesh.sheet.cut is not None
     # Every row of quads is cut, near the edge and nowhere else.
@@ -200,15 +201,26 @@ def test_a_jump_cuts_the_mesh_and_nothing_is_interpolated_across_it(gap: int) ->
     )  # a pixel's own slope; 6 and 30 if blended
 
 
-@pytest.mark.parametrize("step_mm", [0.0, 1.5])
+@pytest.mark.parametrize("step_mm", [0.0, 1.5, 10.0])
 def test_noise_and_steep_paper_are_no_jumps(step_mm: float) -> None:
     sheet = page_mesh(depth_map(stepped_depth(step_mm)), straight_outline(CORNERS), (20, 28)).sheet
     assert sheet.cut is None
+    wild = plane_depth()
+    wild[60:63, 90:93] -= 80.0
+    assert page_mesh(depth_map(wild), straight_outline(CORNERS), (20, 28)).sheet.cut is None
     climbing = np.tile(600.0 + 3.4 * np.arange(SIZE[0]), (SIZE[1], 1))  # 60 degrees at pixels of 2 mm
     assert page_mesh(depth_map(climbing), straight_outline(CORNERS), (20, 28)).sheet.cut is None
 
 
 def test_depth_that_jumps_everywhere_is_refused() -> None:
-    z = plane_depth() + 30.0 * (np.indices((SIZE[1], SIZE[0])).sum(axis=0) % 2)
+    z = plane_depth() + 60.0 * (np.indices((SIZE[1], SIZE[0])).sum(axis=0) % 2)
     with pytest.raises(StepError, match="the depth jumps in every quad"):
         page_mesh(depth_map(z), straight_outline(CORNERS), (5, 5))
+
+
+def test_jumps_are_the_same_in_any_unit() -> None:
+    z, page = stepped_depth(30.0), np.ones((SIZE[1], SIZE[0]), dtype=bool)
+    for unit in (1e-3, 1.0, 40.0):
+        assert np.array_equal(depth_jumps(z * unit, page, 400.0), depth_jumps(z, page, 400.0))
+    assert depth_jumps(z, page, 400.0)[:, 99:101].all()
+    assert depth_jumps(z, page, 400.0).sum() == 2 * SIZE[1]
