@@ -43,6 +43,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+_PICTURES = (".png", ".tif", ".tiff")
+
 CaptureFolder = Annotated[
     Path, typer.Argument(metavar="CAPTURE", help="Capture folder (capture.toml, white.png, ...).")
 ]
@@ -75,30 +77,60 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on std
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """Which pictures of a page are asked for; plain white if neither lights nor combinations are named."""
+    """Which pictures of a page are asked for, and where; plain white if neither lights nor combinations are named."""
 
-    lights: tuple[str, ...] = ()
-    combine: tuple[str, ...] = ()
-    scale: float = 1.0
+    output: Path
+    lights: tuple[str, ...]
+    combine: tuple[str, ...]
+    scale: float
 
     @classmethod
-    def of(cls, lights: Sequence[str] | None, combine: Sequence[str] | None, scale: float) -> _Wanted:
+    def of(cls, output: Path, lights: Sequence[str] | None, combine: Sequence[str] | None, scale: float) -> _Wanted:
         require(math.isfinite(scale) and 0 < scale <= 16, "--scale", "lie in (0, 16]", scale)
-        return cls(tuple(dict.fromkeys(lights or ())), tuple(dict.fromkeys(combine or ())), scale)
+        return cls(output, tuple(dict.fromkeys(lights or ())), tuple(dict.fromkeys(combine or ())), scale)
 
-    def combined(self, known: Sequence[str]) -> list[str]:
-        """Return the lights that combinations are made of, all in order."""
-        return list(self.lights or known)
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Lights that are a picture of their own."""
+        from deskew.types import WHITE
+
+        return self.lights or (() if self.combine else (WHITE,))
+
+    def combined(self, how: str, known: Sequence[str]) -> list[str]:
+        """Return the lights that a combination is made of: a ratio's two, else those that are named, else all."""
+        from deskew import restoration
+
+        return restoration.lights_of(how, self.lights or known)
+
+    def needed(self, known: Sequence[str]) -> list[str]:
+        """Return the lights to restore, each once."""
+        combined = [light for how in self.combine for light in self.combined(how, known)]
+        return list(dict.fromkeys([*self.shown, *combined]))
+
+    def paths(self, known: Sequence[str]) -> dict[str, Path]:
+        """Name one picture as asked, several after what each shows."""
+        from deskew import restoration
+
+        names = [*self.shown]
+        for how in self.combine:
+            names += restoration.pictures_of(how, self.combined(how, known))
+        twice = sorted({name for name in names if names.count(name) > 1})
+        require(not twice, "--combine", "give pictures of different names", f"several called {', '.join(twice)}")
+        if len(names) == 1:
+            return {names[0]: self.output}
+        return {name: self.output.with_name(f"{self.output.stem}-{name}{self.output.suffix}") for name in names}
 
     def check(self, known: Sequence[str]) -> None:
-        """Refuse what these lights cannot give, before any long work."""
+        """Refuse what these lights cannot give, and where it cannot be written, before any long work."""
+        from deskew import io, restoration
+
         for light in self.lights:
             require(light in known, "--light", f"be one of {', '.join(known)}", light)
-        if self.combine:
-            from deskew import restoration
-
-            for how in self.combine:
-                restoration.require_combination(how, self.combined(known))
+        for how in self.combine:
+            ratio = how.startswith("ratio:")
+            restoration.require_combination(how, known if ratio else self.lights or known)
+        for path in self.paths(known).values():
+            io.require_writable(path, _PICTURES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +214,7 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value  # JSON has no NaN
 
 
-def _report(figures: Mapping[str, Any], as_json: bool, written: Path | None = None) -> None:
+def _report(figures: Mapping[str, Any], as_json: bool, *written: Path) -> None:
     """Print figures, and say what has been `written` already if nobody takes them."""
     plain = _plain(figures)
     lines = [f"{key}: {f'{value:.6g}' if isinstance(value, float) else value}" for key, value in plain.items()]
@@ -192,7 +224,9 @@ def _report(figures: Mapping[str, Any], as_json: bool, written: Path | None = No
         # Else the interpreter would try once more to print what is left in the buffer, and complain in its own words.
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        done = f"`{written}` is written and whole" if written else "nothing was to be written"
+        named = ", ".join(f"`{path}`" for path in written)
+        whole = "is written and whole" if len(written) == 1 else "are written and whole"
+        done = f"{named} {whole}" if written else "nothing was to be written"
         raise StepError(f"Printing the figures failed: {error.strerror or error}; {done}.") from error
 
 
@@ -362,11 +396,11 @@ def restore(
     """
     from deskew import io
 
-    io.require_writable(output, (".png", ".tif", ".tiff"))
-    wanted = _Wanted.of(lights, combine, scale)
+    io.require_writable(output, _PICTURES)
+    wanted = _Wanted.of(output, lights, combine, scale)
     found = io.read_scan(scan_file)
     wanted.check(list(found.images))
-    _restore(found, method, output, as_json, wanted)
+    _restore(found, method, wanted, as_json)
 
 
 @app.command()
@@ -392,11 +426,11 @@ def run(
     """
     from deskew import io
 
-    io.require_writable(output, (".png", ".tif", ".tiff"))
+    io.require_writable(output, _PICTURES)
     _require_method(method)
-    wanted = _Wanted.of(lights, combine, scale)
+    wanted = _Wanted.of(output, lights, combine, scale)
     how = _Scanning(shape, mask, ink, denoise)
-    _restore(_scan(capture, io.read_calibration(calibration), how, wanted), method, output, as_json, wanted)
+    _restore(_scan(capture, io.read_calibration(calibration), how, wanted), method, wanted, as_json)
 
 
 def _require_method(method: str) -> None:
@@ -406,38 +440,43 @@ def _require_method(method: str) -> None:
     find_method(method)
 
 
-def _restore(found: Scan, method: str, output: Path, as_json: bool, wanted: _Wanted) -> None:
+def _restore(found: Scan, method: str, wanted: _Wanted, as_json: bool) -> None:
     import numpy as np
 
-    from deskew import io, pipeline, restoration
-    from deskew.types import WHITE
+    from deskew import pipeline, restoration
 
     known = list(found.images)
-    shown = wanted.lights or (() if wanted.combine else (WHITE,))
-    needed = wanted.combined(known) if wanted.combine else shown
+    needed = wanted.needed(known)
     restored = pipeline.restore_lights(found, method=method, lights=needed, scale=wanted.scale)
     page = np.isfinite(restored.backward_map[..., 0])
-    pictures = {light: restored.images[light] for light in shown}
+    pictures = {light: restored.images[light] for light in wanted.shown}
     for how in wanted.combine:
-        pictures |= restoration.combined({light: restored.images[light] for light in needed}, page, how)
-    paths = _paths(output, list(pictures))
-    figures = {"restored": str(output), "method": method, **_restored_figures(restored.restoration(needed[0]))}
-    if len(paths) > 1:
-        figures["restored"] = [str(path) for path in paths.values()]
+        parts = {light: restored.images[light] for light in wanted.combined(how, known)}
+        pictures |= restoration.combined(parts, page, how)
+    paths = wanted.paths(known)
+    figures: dict[str, Any] = {"restored": [str(path) for path in paths.values()], "method": method}
+    if len(paths) == 1:
+        figures["restored"] = str(wanted.output)
+    figures |= _restored_figures(restored.restoration(needed[0]))
     for light, fit in restored.registrations.items():
         figures |= {f"{light}_scale": fit.scale.tolist(), f"{light}_offset_px": fit.offset.tolist()}
         figures[f"{light}_residual_px"] = fit.residual_px
     figures |= _projector_figures(found.projector)
-    for name, path in paths.items():
-        io.write_image(pictures[name], path)
-    _report(figures, as_json, output)
+    _write_all(pictures, paths)
+    _report(figures, as_json, *paths.values())
 
 
-def _paths(output: Path, names: Sequence[str]) -> dict[str, Path]:
-    """Name one picture as asked, several after what each shows."""
-    if len(names) == 1:
-        return {names[0]: output}
-    return {name: output.with_name(f"{output.stem}-{name}{output.suffix}") for name in names}
+def _write_all(pictures: Mapping[str, Array], paths: Mapping[str, Path]) -> None:
+    """Write every picture or leave none behind."""
+    from deskew import io
+
+    try:
+        for name, path in paths.items():
+            io.write_image(pictures[name], path)
+    except BaseException:
+        for path in paths.values():
+            path.unlink(missing_ok=True)
+        raise
 
 
 def _say(message: str) -> None:

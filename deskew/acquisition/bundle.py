@@ -26,7 +26,7 @@ _POSE = 6
 _CAMERA, _PROJECTOR, _STEREO = slice(0, 8), slice(8, 16), slice(16, 22)
 _SHARED = 22  # parameters before the poses
 _REJECT_SIGMAS = 4.0
-_REWEIGHTINGS = 3  # the weights settle within them
+_ROUNDS = 4  # the weights settle within them
 _SINGULAR = 1e7  # condition from which a parameter is lost in the rounding of J^T J
 
 
@@ -122,7 +122,8 @@ class Refined:
     @property
     def condition(self) -> float:
         """Condition number of the Jacobian with its columns brought to unit length; infinite if it is singular."""
-        return float(np.linalg.cond(self.jacobian / np.linalg.norm(self.jacobian, axis=0)))
+        scale = np.linalg.norm(self.jacobian, axis=0)
+        return float(np.linalg.cond(self.jacobian / scale)) if scale.all() else float("inf")
 
     def deviations(self) -> Floats:
         """One standard deviation of each parameter, (22 + 6 P,).
@@ -132,13 +133,13 @@ class Refined:
         StepError
             If the poses leave a parameter undetermined.
         """
-        scale = np.linalg.norm(self.jacobian, axis=0)
-        scaled = self.jacobian / scale
         if not self.condition < _SINGULAR:
             raise StepError(
                 "calibration: the poses leave a parameter undetermined; add poses tilted by 15 to 30 degrees about "
                 "different axes and at different heights."
             )
+        scale = np.linalg.norm(self.jacobian, axis=0)
+        scaled = self.jacobian / scale
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / scale)
 
 
@@ -174,18 +175,15 @@ def pixel_residuals(bundle: Bundle, seen: Observations) -> Floats:
 
 
 def refine(start: Bundle, seen: Observations) -> Refined:
-    """Refine to convergence: first on the corners above all, then with each kind's own noise level, without outliers.
+    """Refine to convergence, each kind of residual with the noise that it shows, without outliers.
 
     Raises
     ------
     StepError
         If the bundle does not converge, or the poses leave a parameter undetermined.
     """
-    kept = np.ones(len(seen.pixels), dtype=bool)
-    # Until the residuals say how far they agree, the pixels of a square count as one.
-    sigmas = (1.0, float(np.sqrt(len(seen.pixels) / len(np.unique(seen.square)))))
-    bundle, jacobian, steps = _solve(start, seen, sigmas)
-    for _ in range(_REWEIGHTINGS):
+    bundle, steps = start, 0
+    for _ in range(_ROUNDS):
         kept, sigmas = _weights(bundle, seen)
         bundle, jacobian, taken = _solve(bundle, _subset(seen, kept), sigmas)
         steps += taken

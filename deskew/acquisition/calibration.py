@@ -285,7 +285,8 @@ def _calibration(solved: Refined, board: Board, residuals: dict[str, float]) -> 
     names = [f"{device}_{name}" for device in ("camera", "projector") for name in INTRINSICS]
     names += [f"stereo_{name}" for name in ("rx", "ry", "rz", "tx", "ty", "tz")]
     uncertainty = dict(zip(names, map(float, solved.deviations()), strict=False))
-    convergence = {"steps": float(solved.steps), "condition": solved.condition}
+    rejected = 1.0 - float(solved.kept.mean())
+    convergence = {"steps": float(solved.steps), "condition": solved.condition, "rejected_share": rejected}
     return Calibration(
         camera, projector, residuals, uncertainty, len(bundle.poses), board.unit, convergence=convergence
     )

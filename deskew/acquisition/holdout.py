@@ -19,6 +19,7 @@ from deskew.projection import undistort
 from deskew.types import Floats
 
 FEWEST_POSES = 4  # one to leave out, and three that determine the devices
+_FEWEST_PIXELS = 20  # of a board, from which its size is triangulated
 
 
 def held_out(solved: Refined, seen: Observations) -> dict[str, float]:
@@ -36,7 +37,8 @@ def held_out(solved: Refined, seen: Observations) -> dict[str, float]:
     dict
         `held_out_camera_rms_px`: radial residual of the left-out board's corners, its six pose parameters fitted to
         them. `held_out_projector_rms_px`: of its decoded pixels, with that pose. `held_out_length_rms`: error of the
-        board's diagonal as triangulated, in the board's unit. Each over all boards; empty with fewer than four.
+        board's diagonal as triangulated, in the board's unit. Each over all boards, the last two without those whose
+        pixels are nearly all outliers; empty with fewer than four.
     """
     n_poses = len(seen.corners)
     if n_poses < FEWEST_POSES:
@@ -47,9 +49,12 @@ def held_out(solved: Refined, seen: Observations) -> dict[str, float]:
         board = _only(seen, pose, solved.kept)
         bundle = _posed(_without(solved, seen, pose), board)
         squares["camera_rms_px"].append((corner_residuals(bundle, board) ** 2).sum(axis=-1).ravel())
+        if len(board.pixels) < _FEWEST_PIXELS:
+            continue
         squares["projector_rms_px"].append((pixel_residuals(bundle, board) ** 2).sum(axis=-1))
         squares["length_rms"].append(np.array([(diagonal * (_scale(bundle, board) - 1.0)) ** 2]))
-    return {f"held_out_{name}": float(np.sqrt(np.concatenate(values).mean())) for name, values in squares.items()}
+    pooled = {name: np.concatenate(values) for name, values in squares.items() if values}
+    return {f"held_out_{name}": float(np.sqrt(values.mean())) for name, values in pooled.items()}
 
 
 def _without(solved: Refined, seen: Observations, pose: int) -> Bundle:

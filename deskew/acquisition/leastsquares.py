@@ -41,6 +41,8 @@ def levenberg_marquardt(
     x: Floats = start
     r = residuals(x)
     damping = 1e-6
+    if not np.isfinite(r @ r):
+        raise StepError("calibration: the bundle adjustment starts from no finite residuals; add poses.")
     for taken in range(_ITERATIONS):
         J = jacobian(x)
         scale = np.linalg.norm(J, axis=0)
@@ -54,6 +56,8 @@ def levenberg_marquardt(
                 break
             damping *= 10.0
         else:
+            if not np.isfinite(tried @ tried):
+                raise StepError("calibration: the bundle adjustment met no finite residuals; add poses.")
             return x, taken  # no direction lowers the cost any more: it rests to rounding
         gained = r @ r - tried @ tried
         x, r, damping = x + step, tried, max(0.1 * damping, 1e-12)

@@ -24,7 +24,7 @@ MAX_LIGHTS = 256
 MAX_FRINGES = 16
 
 _IMAGE_NAMES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp")
-_LIGHT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+LIGHT_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +116,7 @@ def numbered(folder: Path, n: int, root: Path, prefix: str = "") -> tuple[Path, 
 
 def _lights(fields: Fields, folder: Path) -> StoredTextures:
     lights = fields.values.get("lights", [])
-    good = isinstance(lights, list) and all(isinstance(n, str) and _LIGHT.fullmatch(n) for n in lights)
+    good = isinstance(lights, list) and all(isinstance(n, str) and LIGHT_NAME.fullmatch(n) for n in lights)
     name = f"{fields.name}: lights"
     require(good, name, "be a list of names made of letters, digits, - and _", shown(lights))
     unique = len(set(lights)) == len(lights) <= MAX_LIGHTS
@@ -137,8 +137,9 @@ def _fringes(fields: Fields, pattern: PatternKind, projector_size: Size) -> Frin
         none = "fringes" not in fields.values
         require(none, f"{fields.name}: fringes", f"be left out for a {pattern}", shown(fields.values.get("fringes")))
         return ()
-    periods = fields.table("fringes").numbers("period_px", MAX_FRINGES)
-    steps = fields.table("fringes").numbers("n_steps", MAX_FRINGES)
+    table = fields.table("fringes")
+    table.only(("period_px", "n_steps"))
+    periods, steps = table.numbers("period_px", MAX_FRINGES), table.numbers("n_steps", MAX_FRINGES)
     alike = len(steps) == len(periods)
     require(alike, f"{fields.name}: fringes", "have as many n_steps as period_px", f"{len(steps)} and {len(periods)}")
     try:
@@ -245,7 +246,7 @@ def write_capture(capture: Capture, folder: Path) -> None:
         If the file system refuses.
     """
     for light in capture.textures:
-        named = bool(_LIGHT.fullmatch(light))
+        named = bool(LIGHT_NAME.fullmatch(light))
         require(named, "textures", "have names made of letters, digits, - and _", shown(light))
     gray = capture.pattern is PatternKind.GRAY_CODE
     n_columns, n_rows = len(capture.columns), len(capture.rows)

@@ -9,7 +9,8 @@ import numpy as np
 
 from deskew.errors import InputError, require
 from deskew.io.arrays import read_arrays, require_arrays, write_arrays
-from deskew.io.files import write_bytes
+from deskew.io.captures import LIGHT_NAME
+from deskew.io.files import shown, write_bytes
 from deskew.io.images import encoded, read_raster, require_picture
 from deskew.types import Array, DepthMap, Floats, Pinhole, Reason, Scan, Sheet
 
@@ -37,7 +38,9 @@ def _pinhole_arrays(device: Pinhole, prefix: str) -> dict[str, Array]:
 
 
 def _pinhole(arrays: Mapping[str, Array], prefix: str) -> Pinhole:
-    width, height = (int(side) for side in arrays[f"{prefix}_size"])
+    size = arrays[f"{prefix}_size"]
+    require(size.dtype.kind in "iu", f"{prefix}_size", "be whole numbers of pixels", size.dtype)
+    width, height = (int(side) for side in size)
     return Pinhole((width, height), *(arrays[f"{prefix}_{name}"] for name in ("K", "distortion", "R", "t")))
 
 
@@ -163,6 +166,8 @@ def read_scan(path: Path) -> Scan:
     try:
         images = {name.removeprefix("image_"): v for name, v in arrays.items() if name.startswith("image_")}
         for light, image in images.items():
+            named = bool(LIGHT_NAME.fullmatch(light))
+            require(named, "image_LIGHT", "name its light in letters, digits, - and _", shown(light))
             require_picture(image, f"image_{light}")
         camera = _pinhole(arrays, "camera")
         white = images["white"].shape[1::-1]

@@ -42,7 +42,8 @@ def ratio(image: Array, by: Array, page: npt.NDArray[np.bool_]) -> Floats:
     """
     upper, lower = _stack([image, by])
     _require_page(page, upper)
-    floor = max(_FLOOR * float(np.median(lower[page])), 1e-6)
+    # Never below a grey level: a denominator without light says nothing of what it would have shown.
+    floor = max(_FLOOR * float(np.median(lower[page])), 1.0)
     return np.asarray(upper / np.maximum(lower, floor))
 
 
@@ -108,8 +109,22 @@ def require_combination(how: str, lights: Collection[str]) -> None:
     require(known, "combine", f"be one of {COMBINATIONS}", how)
     for light in parts or ():
         require(light in lights, f"combine {how}", f"name two of {', '.join(lights)}", light)
+    require(parts is None or parts[0] != parts[1], f"combine {how}", "name two different lights", how)
     enough = parts is not None or len(lights) >= 2
     require(enough, f"combine {how}", "be of at least 2 lights", f"only {', '.join(lights)}")
+
+
+def lights_of(how: str, lights: Sequence[str]) -> list[str]:
+    """Name the lights that a combination of `lights` looks at: a ratio at its two, the others at all."""
+    return list(_ratio_parts(how) or lights)
+
+
+def pictures_of(how: str, lights: Sequence[str]) -> list[str]:
+    """Name the pictures that :func:`combined` makes of these lights."""
+    parts = _ratio_parts(how)
+    if parts is not None:
+        return [f"ratio-{parts[0]}-{parts[1]}"]
+    return [f"component-{k + 1}" for k in range(len(lights))] if how == "components" else [how]
 
 
 def combined(images: Mapping[str, Array], page: npt.NDArray[np.bool_], how: str) -> dict[str, npt.NDArray[np.uint8]]:
@@ -133,7 +148,8 @@ def combined(images: Mapping[str, Array], page: npt.NDArray[np.bool_], how: str)
     every = list(images.values())
     if how == "components":
         scores = principal_components(every, page).scores
-        return {f"component-{k + 1}": as_picture(score, page) for k, score in enumerate(scores)}
+        names = pictures_of(how, list(images))
+        return {name: as_picture(score, page) for name, score in zip(names, scores, strict=True)}
     parts = _ratio_parts(how)
     if parts is not None:
         over, under = parts

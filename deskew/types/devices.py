@@ -91,8 +91,9 @@ class Calibration:
         Standard deviation of a camera pixel's footprint, lens and pixel area together, as the boards' edges show it
         [px]; None if it is not known.
     convergence : mapping
-        `steps` taken until the bundle rested, and the `condition` number of its scaled Jacobian: by so much the
-        worst-determined mixture of parameters is known less well than the best.
+        `steps` taken until the bundle rested; `condition` number of its scaled Jacobian: by so much the
+        worst-determined mixture of parameters is known less well than the best; `rejected_share` of the decoded pixels
+        that agree with no solution: a whole board among them stands out here.
     """
 
     camera: Pinhole

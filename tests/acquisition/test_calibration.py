@@ -179,3 +179,15 @@ def test_a_board_view_keeps_enough_pixels_of_its_own_capture(n_pixels_max):
     smaller = Correspondence(nothing[1:], nothing[1:], seen.reason[1:])
     with pytest.raises(InputError, match=r"`correspondence` must have the capture's shape \(48, 64\), got \(47, 64\)"):
         view_board(BOARD, capture, smaller)
+
+
+@pytest.mark.parametrize("shift_px", [2.0, 5.0, 30.0])
+def test_a_board_whose_pixels_are_all_wrong_is_outvoted_and_told(shift_px):
+    views = _views(0.03, 0.05)
+    views[3] = replace(views[3], projected=views[3].projected + shift_px)
+    calibration = calibrate(BOARD, views)
+    assert np.abs(_parameters(calibration.projector)[2:4] - (520, 840)).max() < 6.0
+    assert calibration.residuals["stereo_rms_px"] < 0.07
+    assert calibration.convergence["rejected_share"] == pytest.approx(1 / 9, abs=0.01)
+    assert calibration.residuals["held_out_projector_rms_px"] < 0.1
+    assert 0 < calibration.residuals["held_out_length_rms"] < 0.1

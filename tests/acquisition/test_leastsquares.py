@@ -56,3 +56,15 @@ def test_what_does_not_rest_is_a_failed_step(monkeypatch):
     monkeypatch.setattr(leastsquares, "_ITERATIONS", 2)
     with pytest.raises(StepError, match="did not converge in 2 steps"):
         levenberg_marquardt(lambda p: (model(p) - model(TRUE)) / 1e-3, lambda p: jacobian(p) / 1e-3, TRUE * 1.8)
+
+
+@pytest.mark.parametrize("broken_after", [0, 1])
+def test_residuals_that_are_not_finite_are_a_failed_step(broken_after):
+    calls = []
+
+    def residuals(p):
+        calls.append(p)
+        return (model(p) - model(TRUE)) * (1.0 if len(calls) <= broken_after else np.nan)
+
+    with pytest.raises(StepError, match="no finite residuals"):
+        levenberg_marquardt(residuals, jacobian, TRUE * 1.1)

@@ -213,6 +213,24 @@ def test_combinations_alone_are_made_of_all_lights(
     assert sorted(path.name for path in (here / "out").iterdir()) == ["r-component-1.png", "r-component-2.png"]
 
 
+def test_a_ratio_asks_for_its_two_lights_alone(here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("restore scan.npz -o out/r.png --light uv --combine ratio:white/uv", capsys)[0] == 0
+    assert steps.calls["restore"]["lights"] == ["uv", "white"]
+    scan = StandIn().scan(capture(), CALIBRATION, shape=(3, 4))
+    more = replace(scan, images={**scan.images, "mean": scan.images["uv"], "raking": scan.images["uv"]})
+    io.write_scan(more, here / "more.npz")
+    assert run("restore more.npz -o out/s.png --combine ratio:white/uv", capsys)[0] == 0
+    assert steps.calls["restore"]["lights"] == ["white", "uv"]
+    steps.calls.clear()
+    wanted = "deskew: `--combine` must give pictures of different names, got several called mean.\n"
+    assert run("restore more.npz -o out/t.png -l white -l mean --combine mean", capsys) == (2, "", wanted)
+    (here / "out" / "u-uv.png").mkdir()
+    code, _, err = run("restore more.npz -o out/u.png -l white -l uv", capsys)
+    assert (code, err.count("\n")) == (2, 1)
+    assert not steps.calls  # told before the long work
+    assert not (here / "out" / "u-white.png").exists()
+
+
 def test_accuracy_measures_the_page_and_not_the_desk(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -320,6 +338,7 @@ WRONG_LINES = {
     "shape of one": ("run page -c c.json -o out/r.png --shape 45", "'--shape' requires 2 arguments"),
     "shape of words": ("run page -c c.json -o out/r.png --shape 45 x", "Invalid value for '--shape'"),
     "shape of fractions": ("run page -c c.json -o out/r.png --shape 4.5 4", "Invalid value for '--shape'"),
+    "ratio of one": ("restore scan.npz -o out/r.png --combine ratio:uv/uv", "two different lights"),
     "mask missing": ("scan page -c c.json -o out/s.npz --mask none.png", "none.png"),
     "mask of another size": ("run page -c c.json -o out/r.png --mask small.png", "small.png"),
     "mask of nothing": ("run page -c c.json -o out/r.png --mask dark.png", "`--mask` must show the page"),
@@ -447,7 +466,7 @@ def test_the_module_ends_with_the_exit_code() -> None:
 def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
     program = (
         "import sys; from deskew import cli\n"
-        "def restore(found, method, output, as_json, wanted): output.touch(); cli._report({}, as_json, output)\n"
+        "def restore(found, method, wanted, as_json): wanted.output.touch(); cli._report({}, as_json, wanted.output)\n"
         "cli._restore = restore\n"
         "sys.exit(cli.main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
     )

@@ -319,3 +319,11 @@ def test_written_files_obey_the_umask(gray_folder: Path) -> None:
     os.umask(umask)
     assert gray_folder.stat().st_mode & 0o777 == 0o777 & ~umask
     assert (gray_folder / "white.png").stat().st_mode & 0o777 == 0o666 & ~umask
+
+
+def test_a_misspelt_key_of_the_fringes_does_not_pass(tmp_path: Path, new_capture: MakeCapture) -> None:
+    write_capture(new_capture(PatternKind.GRAY_PHASE, np.uint8, 0), tmp_path / "page")
+    path = tmp_path / "page" / "capture.toml"
+    path.write_text(path.read_text().replace("[fringes]", "[fringes]\nn_step = 3"))
+    with pytest.raises(InputError, match=r"fringes` must have the keys n_steps, period_px, got also .*n_step"):
+        read_capture(tmp_path / "page")

@@ -103,6 +103,13 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "sheet NaN": (lambda a: a["sheet_vertices"].fill(np.nan), "`vertices` must be finite"),
     "sheet of one row": (lambda a: a.update(sheet_vertices=np.zeros((1, 4, 3))), "R, C >= 2"),
     "filled more than all": (lambda a: a["filled_fraction"].fill(1.5), r"`filled_fraction` must be in \[0, 1\]"),
+    "camera of half pixels": (
+        lambda a: a.update(camera_size=np.array([12.5, 8])),
+        "camera_size` must be whole numbers",
+    ),
+    "camera of no size": (lambda a: a.update(camera_size=np.array([np.nan, 8])), "camera_size` must be whole numbers"),
+    "light with a slash": (lambda a: a.update({"image_x/y": a["image_white"]}), "image_LIGHT` must name its light"),
+    "light without a name": (lambda a: a.update({"image_": a["image_white"]}), "image_LIGHT` must name its light"),
     "stiffness negative": (lambda a: a["sheet_stiffness"].fill(-1), "`stiffness` must be positive"),
     "outline of three": (lambda a: a.update(outline=np.zeros((3, 2))), r"outline` must have shape \(4, 2\)"),
     "outline NaN": (lambda a: a["outline"].fill(np.nan), "`outline` must be finite"),
