@@ -30,6 +30,17 @@ _FINE = "uv_fine"
 _TEXTS = {Layer.FLUORESCENCE: "uv_text", Layer.TRANSMITTANCE: "backlight_text", Layer.RELIEF: "raking_text"}
 _COMBINED = ("mean", "max", "ratio:uv/above", "ratio:backlight/above", "ratio:raking/above", "components")
 _N_SHOWN = 5
+_SHOWN = {
+    "crumpled": "white, as it lies",
+    "above": "above",
+    "raking": "raking",
+    "uv": "ultra-violet",
+    "backlight": "back-light",
+    "ratio-uv-above": "uv / above",
+    "ratio-backlight-above": "back-light / above",
+    "component-2": "component 2",
+    "component-3": "component 3",
+}
 
 
 class TexturesStudy(Study):
@@ -74,17 +85,7 @@ class TexturesStudy(Study):
         (
             Montage(
                 "lights",
-                (
-                    ("white, as it lies", "page_{trial}_crumpled"),
-                    ("above", "page_{trial}_above"),
-                    ("raking", "page_{trial}_raking"),
-                    ("ultra-violet", "page_{trial}_uv"),
-                    ("back-light", "page_{trial}_backlight"),
-                    ("uv / above", "page_{trial}_ratio-uv-above"),
-                    ("back-light / above", "page_{trial}_ratio-backlight-above"),
-                    ("component 2", "page_{trial}_component-2"),
-                    ("component 3", "page_{trial}_component-3"),
-                ),
+                tuple((heading, f"page_{{trial}}_{name}") for name, heading in _SHOWN.items()),
             ),
         ),
     )
@@ -198,7 +199,7 @@ class _Trial:
             self.record.add(condition, method, {f"{text}_{name}": value for name, value in figures.items()})
 
     def _picture(self, name: str, image: Array) -> None:
-        if self.record.key.trial < _N_SHOWN:
+        if name in _SHOWN and self.record.key.trial < _N_SHOWN:
             self.record.picture(f"page_{self.record.key.trial}_{name}", image)
 
 
