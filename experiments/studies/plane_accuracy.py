@@ -40,7 +40,7 @@ _FAULT_FIGURES = {
     "checkered": ("length_error_mm",),
     "sphere": ("probing_form_mm", "probing_size_mm", "sphere_spacing_error_mm"),
 }
-_PICTURED = 5
+_PICTURED = 3
 # What a fault does hardly depends on the pose: three tell how hardly.
 _FAULTED = 3
 

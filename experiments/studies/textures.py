@@ -29,7 +29,7 @@ _KONTRON: Size = (1996, 1450)
 _FINE = "uv_fine"
 _TEXTS = {Layer.FLUORESCENCE: "uv_text", Layer.TRANSMITTANCE: "backlight_text", Layer.RELIEF: "raking_text"}
 _COMBINED = ("mean", "max", "ratio:uv/above", "ratio:backlight/above", "ratio:raking/above", "components")
-_N_SHOWN = 5
+_N_SHOWN = 3
 _SHOWN = {
     "crumpled": "white, as it lies",
     "above": "above",
