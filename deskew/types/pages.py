@@ -26,23 +26,25 @@ class Sheet:
         Positions in the world [mm]; a grid's rows run along the page's v, its columns along u.
     faces : (F, 3) int array or None
         Triangles; None for a grid.
-    stiffness : (R - 1, C - 1) array or None
-        Spring constant k_s of each quad of a grid [kg/s^2]; None for the method's own uniform value.
+    stiffness : (R - 1, C - 1) or (F,) array or None
+        Spring constant k_s of each quad of a grid, or of each face [kg/s^2]; None for the method's own uniform value.
     cut : (R - 1, C - 1) bool array or None
         Quads of a grid across which the surface breaks off: nothing joins their sides. None for a sheet in one piece.
+    surface : ((R - 1) n + 1, (C - 1) n + 1, 3) array or None
+        The surface that a grid was taken from, sampled n >= 2 times as finely along the grid's own rows and columns
+        [mm]: every n-th of its vertices is one of the grid's. None where only the grid is known.
     """
 
     vertices: Floats
     faces: npt.NDArray[np.integer[Any]] | None = None
     stiffness: Floats | None = None
     cut: npt.NDArray[np.bool_] | None = None
+    surface: Floats | None = None
 
     def __post_init__(self) -> None:
         require_numbers("vertices", self.vertices, "fiu")
         if self.faces is not None:
             require_numbers("faces", self.faces, "iu")
-        if self.stiffness is not None:
-            require_numbers("stiffness", self.stiffness, "fiu")
         vertices = np.ascontiguousarray(self.vertices, dtype=np.float64)
         object.__setattr__(self, "vertices", vertices)
         if self.faces is None:
@@ -61,25 +63,47 @@ class Sheet:
             "be finite",
             f"{int((~np.isfinite(vertices)).any(-1).sum())} vertices with NaN or infinity",
         )
-        if self.stiffness is not None:
-            shape = (vertices.shape[0] - 1, vertices.shape[1] - 1)
-            require(
-                self.faces is None and self.stiffness.shape == shape,
-                "stiffness",
-                f"have shape {shape}, one value a quad",
-                self.stiffness.shape,
-            )
-            require(
-                bool((self.stiffness > 0).all() and np.isfinite(self.stiffness).all()),
-                "stiffness",
-                "be positive and finite [kg/s^2]",
-                f"a minimum of {np.min(self.stiffness)}",
-            )
+        self._check_stiffness()
         if self.cut is not None:
             shape = (vertices.shape[0] - 1, vertices.shape[1] - 1)
             sound = self.faces is None and self.cut.shape == shape and self.cut.dtype == np.bool_
             require(sound, "cut", f"be bool of shape {shape}, one value a quad of a grid", self.cut.shape)
             require(not self.cut.all(), "cut", "leave a quad whole", "every quad cut")
+        self._check_surface()
+
+    @property
+    def refinement(self) -> int:
+        """How many steps of `surface` lie between two neighbours of the grid; 1 without a surface."""
+        return 1 if self.surface is None else (self.surface.shape[0] - 1) // (self.vertices.shape[0] - 1)
+
+    def _check_stiffness(self) -> None:
+        if self.stiffness is None:
+            return
+        require_numbers("stiffness", self.stiffness, "fiu")
+        rows, columns = self.vertices.shape[:2]
+        shape = (rows - 1, columns - 1) if self.faces is None else (len(self.faces),)
+        each = "quad" if self.faces is None else "face"
+        require(
+            self.stiffness.shape == shape, "stiffness", f"have shape {shape}, one value a {each}", self.stiffness.shape
+        )
+        sound = bool((self.stiffness > 0).all() and np.isfinite(self.stiffness).all())
+        require(sound, "stiffness", "be positive and finite [kg/s^2]", f"a minimum of {np.min(self.stiffness)}")
+
+    def _check_surface(self) -> None:
+        if self.surface is None:
+            return
+        require_numbers("surface", self.surface, "fiu")
+        object.__setattr__(self, "surface", np.ascontiguousarray(self.surface, dtype=np.float64))
+        require(self.faces is None, "surface", "belong to a grid", "a triangle mesh")
+        rows, columns = self.vertices.shape[:2]
+        n = self.refinement
+        nested = n >= 2 and self.surface.shape == ((rows - 1) * n + 1, (columns - 1) * n + 1, 3)
+        require(nested, "surface", f"have shape ({rows - 1} n + 1, {columns - 1} n + 1, 3), n >= 2", self.surface.shape)
+        require(bool(np.isfinite(self.surface).all()), "surface", "be finite", "NaN or infinity")
+        same = np.abs(self.surface[::n, ::n] - self.vertices).max() <= 1e-6 * max(
+            1.0, float(np.abs(self.vertices).max())
+        )
+        require(bool(same), "surface", f"hold the grid as every {n}-th of its vertices", "other places")
 
 
 class Status(StrEnum):
