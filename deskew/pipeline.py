@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from deskew import acquisition, flattening, restoration
-from deskew.acquisition import DecoderSettings, DenoiseSettings, DepthSettings, InkSettings, Outline
+from deskew.acquisition import DecoderSettings, DenoiseSettings, DepthSettings, InkSettings, Outline, SweepSettings
 from deskew.errors import StepError, require
 from deskew.restoration import Textures
 from deskew.types import (
@@ -20,10 +20,60 @@ from deskew.types import (
     Correspondence,
     DepthMap,
     Flattened,
+    PatternKind,
     Restoration,
     Scan,
     Status,
 )
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """How a page is scanned for a flattening method.
+
+    Attributes
+    ----------
+    mode : str
+        How a line sweep is read, "spatial" (section 2.3: a curve a frame) or "temporal" (a pixel by itself).
+    ink : bool
+        Whether what ink does to the decoded coordinates is taken out.
+    denoise : bool
+        Whether the depth map is filtered.
+    """
+
+    mode: str
+    ink: bool
+    denoise: bool
+
+    def decoder(self, pattern: PatternKind) -> DecoderSettings | None:
+        """Return the settings of a pattern's decoder; None for its own."""
+        if pattern is PatternKind.LINE_SWEEP:
+            return SweepSettings(mode=self.mode)
+        return acquisition.settings_for_ink(pattern) if self.ink else None
+
+
+PAPER_RECIPE = Recipe("spatial", ink=False, denoise=False)
+"""As the paper scans: no ink correction, no filter."""
+
+BEST_RECIPE = Recipe("temporal", ink=True, denoise=True)
+"""What serves rest lengths along the surface."""
+
+
+def recipe_for(method: str) -> Recipe:
+    """Return the recipe that belongs to a flattening method: the paper's to the paper's methods, else the best."""
+    return PAPER_RECIPE if method.startswith("paper_") else BEST_RECIPE
+
+
+def scan_by(recipe: Recipe, capture: Capture, calibration: Calibration, *, shape: tuple[int, int] = (45, 45)) -> Scan:
+    """Scan a page by a recipe; see :func:`scan`."""
+    return scan(
+        capture,
+        calibration,
+        shape=shape,
+        settings=recipe.decoder(capture.pattern),
+        ink=InkSettings() if recipe.ink else None,
+        denoise=DenoiseSettings() if recipe.denoise else None,
+    )
 
 
 def decode(capture: Capture, settings: DecoderSettings | None = None) -> Correspondence:
@@ -151,7 +201,7 @@ def span(
 
 
 def restore(
-    scan: Scan, *, method: str = "paper_euler", light: str = WHITE, scale: float = 1.0, **settings: object
+    scan: Scan, *, method: str = flattening.DEFAULT, light: str = WHITE, scale: float = 1.0, **settings: object
 ) -> Restoration:
     """Flatten a scan and render the page as if it had never been bent (sections 3 and 3.5).
 
@@ -181,7 +231,7 @@ def restore(
 def restore_lights(
     scan: Scan,
     *,
-    method: str = "paper_euler",
+    method: str = flattening.DEFAULT,
     lights: Iterable[str] | None = None,
     scale: float = 1.0,
     **settings: object,

@@ -178,12 +178,18 @@ class ScanSettings(Checked):
     `mode`: how a line sweep is read (section 2.3), `spatial`, the paper's, per frame; or `temporal`, per pixel.
     `ink`: whether what ink does to the decoded coordinates is taken out; the paper does not.
     `denoise`: whether the depth map is filtered before it is meshed; the paper's is not.
+    What is null is as each flattening method has it: the paper's methods scan as the paper does, all others temporally,
+    with both corrections. An experiment without methods scans as the paper does.
     """
 
     group: ClassVar[str] = "scan."
-    mode: str = choice("spatial", "spatial", "temporal")
-    ink: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
-    denoise: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
+    mode: str | None = setting(
+        None, "be spatial, temporal or null", lambda value: value in (None, "spatial", "temporal")
+    )
+    ink: bool | None = setting(None, "be true, false or null", lambda value: value is None or isinstance(value, bool))
+    denoise: bool | None = setting(
+        None, "be true, false or null", lambda value: value is None or isinstance(value, bool)
+    )
 
 
 @dataclass
@@ -215,7 +221,7 @@ class Config(Checked):
     trials: int = setting(MISSING, "be a whole number in [1, 100000]", lambda value: 1 <= value <= 100_000)
     trials_at: TrialsAt = field(default_factory=TrialsAt)
     # One name or a list of names: Hydra has no type for that, so it is checked and made a list here.
-    method: Any = setting(["paper_euler", "paper_rk4"], "be a method's name or a list of different names", bool)
+    method: Any = setting(["spring"], "be a method's name or a list of different names", bool)
     out: str | None = setting(
         None, "be the name of a folder, without line breaks", lambda value: value is None or value.isprintable()
     )

@@ -21,6 +21,7 @@ from deskew.acquisition.decoding import DecoderSettings, decode, settings_for_in
 from deskew.acquisition.denoise import DenoiseSettings, denoise_depth, depth_noise
 from deskew.acquisition.depthmap import DepthSettings, depth_map
 from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
+from deskew.acquisition.grey import grey_levels
 from deskew.acquisition.ink import InkSettings, correct_ink
 from deskew.acquisition.matches import require_same_devices
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
@@ -61,6 +62,7 @@ __all__ = [
     "fit_plane",
     "fit_sphere",
     "flatness_mm",
+    "grey_levels",
     "kitchen_rosenfeld_peaks",
     "length_errors",
     "page_mesh",

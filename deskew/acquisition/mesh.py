@@ -17,7 +17,9 @@ from deskew.errors import StepError, is_whole, require
 from deskew.types import DepthMap, Floats, Pinhole, Sheet
 
 # About how far apart the surface between the mesh's vertices is sampled, for rest lengths along it [px].
-SECTION_STEP_PX = 3.0
+SURFACE_STEP_PX = 2.0
+# Width over which a depth map rounds a crease: a pixel sees both facets, and so does the interpolation between two.
+CREASE_WIDTH_PX = 1.0
 # Spacing at which a side's length in space is measured [px]: wide enough for depth noise not to lengthen it unevenly.
 SIDE_STEP_PX = 3.0
 
@@ -47,7 +49,6 @@ def page_mesh(
     shape: tuple[int, int] = (45, 45),
     *,
     max_hole_px: float = 12.0,
-    refine: int | None = None,
 ) -> PageMesh:
     """Span a grid over the page and lift it into space by the depth map.
 
@@ -65,8 +66,6 @@ def page_mesh(
         Vertices of the mesh, from 2 x 2 to 1000 x 1000.
     max_hole_px : float
         Depth is carried over the page's rim and over holes up to this distance from measured depth [px].
-    refine : int, optional
-        Steps of the sheet's `surface` between two vertices; if not given, such that a step is about 3 pixels.
 
     Returns
     -------
@@ -82,7 +81,7 @@ def page_mesh(
     sound = isinstance(shape, Sequence) and len(shape) == 2 and all(is_whole(n, 2, 1000) for n in shape)
     require(sound, "shape", "be (rows, columns) of at least 2 x 2 vertices, at most 1000 x 1000", shape)
     filled = fill_depth(depth, outline, max_hole_px)
-    n = refine or _refinement(outline, shape)
+    n, crease_width = _refinement(outline, shape)
     rows, columns = ((size - 1) * n + 1 for size in shape)
     top = _even_nodes(outline.top, filled, depth.camera, columns)
     bottom = _even_nodes(outline.bottom, filled, depth.camera, columns)
@@ -92,15 +91,21 @@ def page_mesh(
     nodes = np.ascontiguousarray(fine[::n, ::n])
     _require_unfolded(nodes)
     surface = _lift(fine, filled, depth.camera)
-    sheet = Sheet(surface[::n, ::n], cut=_cut_quads(nodes, filled), surface=surface if n > 1 else None)
+    sheet = Sheet(
+        surface[::n, ::n],
+        cut=_cut_quads(nodes, filled),
+        surface=surface if n > 1 else None,
+        crease_width=crease_width,
+    )
     return PageMesh(sheet, nodes, _filled_fraction(nodes, filled))
 
 
-def _refinement(outline: Outline, shape: tuple[int, int]) -> int:
-    """How many steps of the surface to a quad: of about `SECTION_STEP_PX`, along the outline's longest side."""
+def _refinement(outline: Outline, shape: tuple[int, int]) -> tuple[int, float]:
+    """Choose how many steps of the surface go to a quad, an even number or 1, and a crease's width in such steps."""
     sides = ((outline.top, shape[1]), (outline.bottom, shape[1]), (outline.left, shape[0]), (outline.right, shape[0]))
-    spacing = max(np.linalg.norm(np.diff(side, axis=0), axis=1).sum() / (n - 1) for side, n in sides)
-    return max(1, round(float(spacing) / SECTION_STEP_PX))
+    spacing = float(np.mean([np.linalg.norm(np.diff(side, axis=0), axis=1).sum() / (n - 1) for side, n in sides]))
+    n = max(1, 2 * round(spacing / SURFACE_STEP_PX / 2))
+    return n, CREASE_WIDTH_PX * n / spacing if n > 1 else 0.0
 
 
 def page_sheet(

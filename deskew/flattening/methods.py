@@ -126,3 +126,11 @@ def _require_result(result: Any, sheet: Sheet, method: str) -> None:
     must(isinstance(status, Status), "return a Status", repr(status))
     finite = status is Status.DIVERGED or bool(np.isfinite(vertices).all())
     must(finite, "return finite vertices unless it diverged", f"{status} with NaN or infinity")
+    inside, wanted = result.surface, sheet.surface
+    if inside is not None:
+        fits = wanted is not None and isinstance(inside, np.ndarray) and inside.shape == wanted.shape
+        must(
+            fits,
+            "return the surface in the sheet's own shape, or None",
+            getattr(inside, "shape", type(inside).__name__),
+        )

@@ -205,6 +205,33 @@ def section_lengths(surface: Floats, n: int) -> Floats:
     return lengths
 
 
+def unfolded_lengths(surface: Floats, n: int, crease_width: float = 0.0) -> Floats:
+    """Length of every spring of a grid along the surface, with what its samples cut off at creases added.
+
+    A chord that crosses a crease cuts it off, wherever its samples happen to lie: on average by a length in proportion
+    to their step h, and a crease that the surface itself rounds over a width w by as much as a step longer by w would.
+    So the arc L(h), followed in steps of h, is extended to the step -w along the line through L(k h) and L(h).
+
+    Parameters
+    ----------
+    surface : ((R - 1) n + 1, (C - 1) n + 1, 3) array
+        The surface [mm].
+    n : int
+        Steps of the surface between two neighbours of the grid, at least 2; k is its smallest divisor.
+    crease_width : float
+        w / h, as in `Sheet`.
+
+    Returns
+    -------
+    (4, R, C) array
+        Lengths [mm], by family, 0 where there is no spring.
+    """
+    k = next(divisor for divisor in range(2, n + 1) if n % divisor == 0)
+    fine = section_lengths(surface, n)
+    coarse = section_lengths(np.ascontiguousarray(surface[::k, ::k]), n // k)
+    return np.asarray(fine + (1.0 + crease_width) / (k - 1) * (fine - coarse))
+
+
 def _two_steps(one: Floats, join: Callable[[Floats, Floats], Floats]) -> Floats:
     """Join each spring's value (4, R, C) with that of the next spring in its own direction; 0 where there is none."""
     two = np.zeros_like(one)
@@ -248,7 +275,7 @@ def grid_springs(sheet: Sheet, settings: SpringSettings) -> Springs:
         sound = low >= SMALLEST and high <= LARGEST
         require(sound, "stiffness", f"be in [{SMALLEST:g}, {LARGEST:g}] [kg/s^2]", f"{low:g} to {high:g}")
     if settings.rest == "section" and sheet.surface is not None:
-        rest = section_lengths(sheet.surface, sheet.refinement)
+        rest = unfolded_lengths(sheet.surface, sheet.refinement, sheet.crease_width)
     else:
         rest = chord_lengths(sheet.vertices)
     constants = spring_constants((rows, columns), settings.k_s, sheet.stiffness, sheet.cut)

@@ -19,6 +19,7 @@ from deskew.flattening import newton
 from deskew.flattening.anderson import Iterated, accelerate
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
+from deskew.flattening.inside import flat_surface
 from deskew.flattening.multigrid import Hierarchy, coarse_index, hierarchy, interpolated, v_cycle
 from deskew.flattening.settings import StaticSettings
 from deskew.flattening.springs import Springs, chord_lengths, grid_springs, spring_constants
@@ -63,7 +64,8 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     -------
     Flattened
         With z = 0, at the mean place and in the direction that the sheet has as seen from above. Counters:
-        `iterations`, `residual_mm`, `spring_energy` [uJ], `folded_quads` and `starts`, the searches made.
+        `iterations`, `residual_mm`, `spring_energy` [uJ], `folded_quads` and `starts`, the searches made. With its
+        `surface`, where the sheet has one.
     """
     springs = grid_springs(sheet, settings.springs)
     tolerance = settings.tolerance * float(max(np.ptp(sheet.vertices[..., axis]) for axis in range(3)))
@@ -82,7 +84,9 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
         status, remedy = Status.FOLDED, _FOLDED.format(folded=folded)
     elif not found.converged:
         status, remedy = Status.LOCKED, _UNSETTLED.format(n=found.n_iterations)
-    return Flattened(as_seen(found.x, sheet.vertices, -_handedness(sheet.vertices)), status, remedy, counters)
+    flat = as_seen(found.x, sheet.vertices, -_handedness(sheet.vertices))
+    inside = None if sheet.surface is None else flat_surface(sheet.surface, flat, sheet.refinement)
+    return Flattened(flat, status, remedy, counters, inside)
 
 
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:

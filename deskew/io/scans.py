@@ -148,6 +148,8 @@ def write_scan(scan: Scan, path: Path) -> None:
         arrays["sheet_stiffness"] = scan.sheet.stiffness
     if scan.sheet.cut is not None:
         arrays["sheet_cut"] = scan.sheet.cut
+    if scan.sheet.surface is not None:
+        arrays["sheet_surface"], arrays["sheet_crease_width"] = scan.sheet.surface, np.array(scan.sheet.crease_width)
     write_arrays(arrays, Path(path))
 
 
@@ -174,7 +176,13 @@ def read_scan(path: Path) -> Scan:
         require(white == camera.size, "image_white", f"have the camera's size {camera.size}", white)
         outline = arrays["outline"]
         require(bool(np.isfinite(outline).all()), "outline", "be finite", "NaN or infinity")
-        sheet = Sheet(arrays["sheet_vertices"], stiffness=arrays.get("sheet_stiffness"), cut=arrays.get("sheet_cut"))
+        sheet = Sheet(
+            arrays["sheet_vertices"],
+            stiffness=arrays.get("sheet_stiffness"),
+            cut=arrays.get("sheet_cut"),
+            surface=arrays.get("sheet_surface"),
+            crease_width=float(arrays.get("sheet_crease_width", 0.0)),
+        )
         filled = float(arrays["filled_fraction"])
         require(0 <= filled <= 1, "filled_fraction", "be in [0, 1]", filled)
         return Scan(images, _depth(arrays, path), camera, sheet, outline, filled_fraction=filled)

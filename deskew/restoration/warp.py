@@ -119,8 +119,9 @@ def texture_quads(image: Array, camera: Pinhole, sheet: Sheet, flattened: Flatte
     finite = bool(np.isfinite(flattened.vertices).all())
     require(finite, "flattened", "have finite vertices", f"status {Status(flattened.status)} with NaN or infinity")
     view, ideal = view_camera(camera, scale), projection.ideal(camera)
-    new = _pixels(view, flattened.vertices, "flattened")
-    source = backward_quads(new, _pixels(ideal, sheet.vertices, "sheet"), view.size, sheet.cut)
+    bent, flat, cut = _quads(sheet, flattened)
+    new = _pixels(view, flat, "flattened")
+    source = backward_quads(new, _pixels(ideal, bent, "sheet"), view.size, cut)
     backward = _through_lens(camera, ideal, source)
     if not np.isfinite(backward[..., 0]).any():
         raise StepError(
@@ -129,6 +130,15 @@ def texture_quads(image: Array, camera: Pinhole, sheet: Sheet, flattened: Flatte
         )
     picture = sample_image(image, backward, camera.size, 1.0 / scale)
     return Restoration(picture, backward, view, flattened)
+
+
+def _quads(sheet: Sheet, flattened: Flattened) -> tuple[Floats, Floats, npt.NDArray[np.bool_] | None]:
+    """Return what is textured, bent and flat, and which quads are cut: the surface where both know it, or the grid."""
+    if sheet.surface is None or flattened.surface is None:
+        return sheet.vertices, flattened.vertices, sheet.cut
+    n = sheet.refinement
+    cut = None if sheet.cut is None else np.repeat(np.repeat(sheet.cut, n, axis=0), n, axis=1)
+    return sheet.surface, flattened.surface, cut
 
 
 def _pixels(view: Pinhole, vertices: Floats, name: str) -> Floats:

@@ -33,6 +33,8 @@ class Sheet:
     surface : ((R - 1) n + 1, (C - 1) n + 1, 3) array or None
         The surface that a grid was taken from, sampled n >= 2 times as finely along the grid's own rows and columns
         [mm]: every n-th of its vertices is one of the grid's. None where only the grid is known.
+    crease_width : float
+        Width over which `surface` rounds what is sharp, in its own steps, in [0, 10]; 0 for samples without error.
     """
 
     vertices: Floats
@@ -40,6 +42,7 @@ class Sheet:
     stiffness: Floats | None = None
     cut: npt.NDArray[np.bool_] | None = None
     surface: Floats | None = None
+    crease_width: float = 0.0
 
     def __post_init__(self) -> None:
         require_numbers("vertices", self.vertices, "fiu")
@@ -90,6 +93,7 @@ class Sheet:
         require(sound, "stiffness", "be positive and finite [kg/s^2]", f"a minimum of {np.min(self.stiffness)}")
 
     def _check_surface(self) -> None:
+        require(0 <= self.crease_width <= 10, "crease_width", "be in [0, 10] steps of the surface", self.crease_width)
         if self.surface is None:
             return
         require_numbers("surface", self.surface, "fiu")
@@ -130,12 +134,15 @@ class Flattened:
     counters : mapping
         `steps`, `steps_rejected`, `force_evaluations`, `contacts`, `folded_quads`, `spring_energy` [uJ], ...
         whatever the method counts.
+    surface : array of the shape of the sheet's `surface`, or None
+        Final places of the surface inside the grid's quads [mm], where the method follows it there.
     """
 
     vertices: Floats
     status: Status
     remedy: str = ""
     counters: Mapping[str, float] = field(default_factory=dict)
+    surface: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)

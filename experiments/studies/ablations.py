@@ -14,6 +14,7 @@ from experiments.studies.accuracy_layout import FIGURES
 from experiments.studies.bench import calibrated_bench
 from experiments.studies.methods import require_methods
 from experiments.studies.noise_ratios import noise_ratios
+from experiments.studies.recipes import configured
 from experiments.studies.study import Study
 from experiments.studies.targets import figures, measured, photographed
 from experiments.trials import Outcome, Recorder, TrialKey, trial_keys
@@ -61,17 +62,17 @@ class Ablations(Study):
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
         """Calibrate the rig of this condition and scan one pose."""
         record, rng = Recorder(key), key.generator()
-        azimuth = float(rng.uniform(0.0, 360.0))
+        azimuth, how = float(rng.uniform(0.0, 360.0)), configured(config.scan)
         with record.attempt(key.condition):
             changes = _changes(config).get(key.condition, {})
             with record.stage("calibrate"):
-                bench = calibrated_bench(replace(config, rig=replace(config.rig, **changes)), key.trial)
+                bench = calibrated_bench(replace(config, rig=replace(config.rig, **changes)), how.mode, key.trial)
             plane = data_synth.plane(tilt_deg=_TILT_DEG, azimuth_deg=azimuth)
             balls = data_synth.ball_plate(tilt_deg=_TILT_DEG / 3, azimuth_deg=azimuth)
             shown: dict[str, float] = {}
             for body, page in ((balls, Blank()), (plane, Checkerboard()), (plane, Blank())):
                 with record.stage("scan"):
-                    target = photographed(bench, body, page, rng, config.scan)
+                    target = photographed(bench, body, page, rng, how)
                 found = measured(target, bench.calibration)
                 # The blank plane comes last: its depth is the one that keeps the name.
                 shown |= figures(target, found, bench.calibration)

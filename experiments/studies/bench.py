@@ -57,10 +57,20 @@ def configured_rig(settings: RigSettings) -> Rig:
     return replace(rig, config=config)
 
 
-def calibrated_bench(config: Config, draw: int = 0) -> Bench:
-    """Photograph the printed board in its poses and calibrate both devices from that; `draw` picks other noise."""
+def calibrated_bench(config: Config, mode: str, draw: int = 0) -> Bench:
+    """Photograph the printed board in its poses and calibrate both devices from that.
+
+    Parameters
+    ----------
+    config : Config
+        Its rig and seed.
+    mode : str
+        How the boards' sweeps are read.
+    draw : int
+        Picks other noise.
+    """
     rig = configured_rig(config.rig)
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION - draw]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
-    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, settings=SweepSettings(mode=config.scan.mode)))
+    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, settings=SweepSettings(mode=mode)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,8 +11,8 @@ import numpy as np
 import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import acquisition, metrics, pipeline, restoration
-from deskew.acquisition import InkSettings, SweepSettings
 from deskew.errors import require
+from deskew.pipeline import Recipe
 from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan
 from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config
@@ -20,6 +21,7 @@ from experiments.studies.flattened import flattening_figures
 from experiments.studies.given_sheets import read_sheet
 from experiments.studies.methods import require_methods
 from experiments.studies.model_view import model_view
+from experiments.studies.recipes import calibration_mode, methods_by_recipe
 from experiments.studies.study import Study
 from experiments.studies.views import DETECTORS, restored_corners, seen_corners
 from experiments.trials import Outcome, Recorder, TrialKey, reason_of
@@ -29,16 +31,20 @@ _N_SHOWN = 5
 
 
 class CornerDistance(Study):
-    """Five crumpled checkerboards, scanned, flattened and restored by the paper's method.
+    """Crumpled checkerboards, scanned, flattened and restored: by the best method, and by the paper's.
+
+    A method comes with its way to scan (`deskew.pipeline.recipe_for`): the paper's as in the paper, all others with the
+    ink corrected and the depth map filtered. What `scan.*` sets holds for all methods.
 
     Conditions
     ----------
     `control`
         The flat page: detected corners against their true places, which is the detector's own error.
     `unrestored`
-        The crumpled page as the camera sees it, against the control; here too its sheet, scan and calibration.
+        The crumpled page as the camera sees it, against the control; here too its sheet and calibration, and the scan
+        if all methods share one.
     `restored`
-        The restored page against the control, a row of figures for each method.
+        The restored page against the control, a row of figures for each method, with its scan if each has its own.
     `control/saddle`, `unrestored/saddle`, `restored/saddle`
         The same pictures measured with saddle corners instead of the paper's Kitchen-Rosenfeld corners.
     """
@@ -106,7 +112,7 @@ class CornerDistance(Study):
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials."""
-        return calibrated_bench(config)
+        return calibrated_bench(config, calibration_mode(config))
 
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
         """Photograph one sheet flat and crumpled, scan it, restore it by each method, measure."""
@@ -119,9 +125,14 @@ class CornerDistance(Study):
         trial = _Trial(record, bench, page, truth)
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)
-        scan = trial.scanned(config, capture)
-        if scan is not None:
-            for method in config.methods:
+        recipes = methods_by_recipe(config)
+        for recipe, methods in recipes.items():
+            # What all methods share stands by itself; else each method has its own scan's figures.
+            shared_by = ["-"] if len(recipes) == 1 else methods
+            scan = trial.scanned(config, capture, recipe, methods, shared_by)
+            if scan is None:
+                continue
+            for method in methods:
                 trial.measure_restored(scan, method, shown=method == config.methods[0])
         return record.outcome()
 
@@ -160,35 +171,37 @@ class _Trial:
         self.record.add("unrestored", "-", self.bench.residuals() | shape)
         self._picture("crumpled", image)
 
-    def scanned(self, config: Config, capture: Capture) -> Scan | None:
-        """Scan the page and measure the depth map; None if that failed, which fails every method."""
-        shape, decoder = (config.mesh.rows, config.mesh.columns), SweepSettings(mode=config.scan.mode)
-        calibration, ink = self.bench.calibration, InkSettings() if config.scan.ink else None
+    def scanned(
+        self, config: Config, capture: Capture, recipe: Recipe, methods: list[str], named: list[str]
+    ) -> Scan | None:
+        """Scan the page for some methods, record the scan's figures as `named`; None if it failed, and they with it."""
+        shape, calibration = (config.mesh.rows, config.mesh.columns), self.bench.calibration
         try:
             # The sweeps are rendered while they are decoded: this stage holds both.
             with self.record.stage("scan"):
-                scan = pipeline.scan(capture, calibration, shape=shape, settings=decoder, ink=ink)
+                scan = pipeline.scan_by(replace(recipe, denoise=False), capture, calibration, shape=shape)
             raw = scan.depth
-            if config.scan.denoise:
+            if recipe.denoise:
                 with self.record.stage("denoise"):
                     scan = pipeline.span(capture, calibration, acquisition.denoise_depth(raw), shape=shape)
         except Exception as error:
-            for method in config.methods:
+            for method in methods:
                 self._fail("restored", method, error)
             return None
-        self._measure_depth(raw, scan.depth)
         cut = 0.0 if scan.sheet.cut is None else float(scan.sheet.cut.sum())
-        self.record.add("unrestored", "-", {"mesh_filled_fraction": scan.filled_fraction, "mesh_cut_quads": cut})
-        self._picture("model", model_view(scan.sheet.vertices))
+        figures = self._depth_figures(raw, scan.depth)
+        figures |= {"mesh_filled_fraction": scan.filled_fraction, "mesh_cut_quads": cut}
+        for name in named:
+            self.record.add("unrestored" if name == "-" else "restored", name, figures)
+        if config.methods[0] in methods:
+            self._picture("model", model_view(scan.sheet.vertices))
         return scan
 
-    def _measure_depth(self, raw: DepthMap, filtered: DepthMap) -> None:
+    def _depth_figures(self, raw: DepthMap, filtered: DepthMap) -> dict[str, float]:
         """Measure the depth map as triangulated, and as filtered where the scan was."""
         true_points = self.truth.points_at(restoration.undistortion_map(self.camera).astype(np.float64))
         figures = metrics.depth_error(raw, true_points)
-        if filtered is not raw:
-            figures |= metrics.depth_error(filtered, true_points, prefix="depth")
-        self.record.add("unrestored", "-", figures)
+        return figures if filtered is raw else figures | metrics.depth_error(filtered, true_points, prefix="depth")
 
     def measure_restored(self, scan: Scan, method: str, *, shown: bool) -> None:
         """Restore by one method and measure the result, whether it came to rest or not."""

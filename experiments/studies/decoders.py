@@ -10,13 +10,13 @@ import numpy as np
 import data_synth
 from data_synth import Blank, Checkerboard, Page, Rig, TrueSheet
 from deskew import acquisition, metrics, pipeline, restoration
-from deskew.acquisition import DecoderSettings, SweepSettings
 from deskew.errors import require
 from deskew.types import Fringe, Fringes, PatternKind, Size, half_periods, n_planes
 from experiments.reporting import Column, Layout
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.methods import require_methods
+from experiments.studies.recipes import configured
 from experiments.studies.study import Study
 from experiments.trials import Outcome, Recorder, TrialKey
 
@@ -84,7 +84,7 @@ class Decoders(Study):
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials and all patterns, with line sweeps."""
-        return calibrated_bench(config)
+        return calibrated_bench(config, configured(config.scan).mode)
 
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
         """Scan one sheet, blank and checkered, by every pattern at every number of frames."""
@@ -139,19 +139,14 @@ def _phases(projector_size: Size, allowed: int) -> tuple[Plan, Plan]:
     )
 
 
-def _settings(config: Config, pattern: PatternKind) -> DecoderSettings | None:
-    if pattern is PatternKind.LINE_SWEEP:
-        return SweepSettings(mode=config.scan.mode)
-    return acquisition.settings_for_ink(pattern) if config.scan.ink else None
-
-
 def _depth_figures(
     config: Config, bench: Bench, sheet: TrueSheet, page: Page, plan: Plan, rng: np.random.Generator
 ) -> dict[str, float]:
     rig = Rig(bench.rig.camera, bench.rig.projector, replace(bench.rig.config, exposures=plan.exposures))
     capture, truth = data_synth.render(rig, sheet, page, rng, plan.pattern, plan.fringes)
-    decoded = pipeline.decode(capture, _settings(config, plan.pattern))
-    if config.scan.ink:
+    how = configured(config.scan)
+    decoded = pipeline.decode(capture, how.decoder(plan.pattern))
+    if how.ink:
         decoded = acquisition.correct_ink(bench.calibration, decoded, capture)
     true_points = truth.points_at(restoration.undistortion_map(bench.calibration.camera).astype(np.float64))
     return metrics.depth_error(acquisition.depth_map(bench.calibration, decoded), true_points)

@@ -22,6 +22,7 @@ from experiments.studies.depth_picture import depth_error_picture
 from experiments.studies.faults import FAULTS
 from experiments.studies.methods import require_methods
 from experiments.studies.noise_ratios import noise_ratios
+from experiments.studies.recipes import configured
 from experiments.studies.study import Study
 from experiments.studies.targets import Measured, Target, figures, measured, photographed
 from experiments.trials import Outcome, Recorder, TrialKey
@@ -81,7 +82,7 @@ class PlaneAccuracy(Study):
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials."""
-        return calibrated_bench(config)
+        return calibrated_bench(config, configured(config.scan).mode)
 
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
         """Scan the bodies in one pose each, then look at them again through wrong calibrations."""
@@ -97,7 +98,7 @@ class PlaneAccuracy(Study):
             body = plate if condition.startswith("sphere") else plane
             with record.attempt(condition):
                 with record.stage("scan", condition):
-                    target = photographed(bench, body, page, rng, config.scan)
+                    target = photographed(bench, body, page, rng, configured(config.scan))
                 seen[condition] = _measure(record, condition, bench, target)
                 record.add(condition, "-", {"tilt_deg": tilt / 3.0 if body is plate else tilt} | bench.residuals())
         for name, wrong in FAULTS.items() if key.trial < _FAULTED else ():

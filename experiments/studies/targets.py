@@ -10,9 +10,9 @@ import numpy.typing as npt
 import data_synth
 from data_synth import BallPlate, Checkerboard, Page, Truth
 from deskew import acquisition, metrics, pipeline, restoration
-from deskew.acquisition import DepthSettings, SweepSettings
+from deskew.acquisition import DepthSettings
+from deskew.pipeline import Recipe
 from deskew.types import Calibration, Capture, Correspondence, DepthMap, Floats
-from experiments.settings import ScanSettings
 from experiments.studies.bench import Bench
 from experiments.studies.scanned import scanned_points
 from experiments.studies.views import seen_corners
@@ -66,13 +66,13 @@ class Measured:
 
 
 def photographed(
-    bench: Bench, body: BallPlate | data_synth.TrueSheet, page: Page, rng: np.random.Generator, scan: ScanSettings
+    bench: Bench, body: BallPlate | data_synth.TrueSheet, page: Page, rng: np.random.Generator, scan: Recipe
 ) -> Target:
     """Photograph a body and decode what was seen."""
     balls = body if isinstance(body, BallPlate) else None
     sheet = body.sheet if isinstance(body, BallPlate) else body
     capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-    correspondence = pipeline.decode(capture, settings=SweepSettings(mode=scan.mode))
+    correspondence = pipeline.decode(capture, settings=scan.decoder(capture.pattern))
     if scan.ink:
         correspondence = acquisition.correct_ink(bench.calibration, correspondence, capture)
     return Target(page, balls, capture, truth, correspondence)

@@ -11,7 +11,6 @@ import numpy as np
 import data_synth
 from data_synth import Format, Layer, Light, Manuscript, Truth
 from deskew import metrics, pipeline, restoration
-from deskew.acquisition import DenoiseSettings, InkSettings, SweepSettings
 from deskew.errors import require
 from deskew.restoration import Registration, Textures
 from deskew.types import Array, Floats, Pinhole, Scan, Size
@@ -21,6 +20,7 @@ from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
 from experiments.studies.hidden_writing import Reader
 from experiments.studies.methods import require_methods
+from experiments.studies.recipes import calibration_mode, methods_by_recipe
 from experiments.studies.study import Study
 from experiments.trials import Outcome, Recorder, TrialKey
 
@@ -99,7 +99,7 @@ class TexturesStudy(Study):
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials."""
-        return calibrated_bench(config)
+        return calibrated_bench(config, calibration_mode(config))
 
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
         """Photograph one sheet under all lights, scan it, restore every light by one flattening, read."""
@@ -118,10 +118,16 @@ class TexturesStudy(Study):
         plain = [light.name for light in lights if light.readout is None]
         trial.measure_unrestored({"white": capture.white} | {name: capture.textures[name] for name in plain})
         with record.stage("scan"):
-            scan = _scanned(config, bench, capture)
-        for method in config.methods:
-            with record.attempt("restored", method):
-                trial.measure_restored(scan, ["white", *plain], method, shown=method == config.methods[0])
+            scans = {
+                recipe: pipeline.scan_by(
+                    recipe, capture, bench.calibration, shape=(config.mesh.rows, config.mesh.columns)
+                )
+                for recipe in methods_by_recipe(config)
+            }
+        for recipe, methods in methods_by_recipe(config).items():
+            for method in methods:
+                with record.attempt("restored", method):
+                    trial.measure_restored(scans[recipe], ["white", *plain], method, shown=method == config.methods[0])
         return record.outcome()
 
 
@@ -135,17 +141,6 @@ def _fine_lights(rng: np.random.Generator, size: Size) -> tuple[Light, ...]:
     readout = Format(_KONTRON, both, (offset[0], offset[1]))
     above, _, uv, _ = data_synth.standard_lights(readout)
     return replace(above, name="above_fine"), replace(uv, name=_FINE)
-
-
-def _scanned(config: Config, bench: Bench, capture: Any) -> Scan:
-    return pipeline.scan(
-        capture,
-        bench.calibration,
-        shape=(config.mesh.rows, config.mesh.columns),
-        settings=SweepSettings(mode=config.scan.mode),
-        ink=InkSettings() if config.scan.ink else None,
-        denoise=DenoiseSettings() if config.scan.denoise else None,
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,29 @@
+"""How each method's pages are scanned: by the recipe that belongs to the method, unless the configuration says else."""
+
+from __future__ import annotations
+
+from deskew.pipeline import PAPER_RECIPE, Recipe, recipe_for
+from experiments.settings import Config, ScanSettings
+
+
+def configured(settings: ScanSettings, own: Recipe = PAPER_RECIPE) -> Recipe:
+    """Return `own` with whatever the configuration sets in its place."""
+    return Recipe(
+        own.mode if settings.mode is None else settings.mode,
+        own.ink if settings.ink is None else settings.ink,
+        own.denoise if settings.denoise is None else settings.denoise,
+    )
+
+
+def calibration_mode(config: Config) -> str:
+    """Return how boards' sweeps are read before pages are scanned for the methods under test: one way for all."""
+    modes = {recipe.mode for recipe in methods_by_recipe(config)}
+    return "temporal" if "temporal" in modes else "spatial"
+
+
+def methods_by_recipe(config: Config) -> dict[Recipe, list[str]]:
+    """Return the methods under test, together where one scan serves them."""
+    grouped: dict[Recipe, list[str]] = {}
+    for method in config.methods:
+        grouped.setdefault(configured(config.scan, recipe_for(method)), []).append(method)
+    return grouped
