@@ -1,0 +1,64 @@
+"""Score a flattening by any program against the truth: where the vertices are, and what became of lengths and areas."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from deskew.errors import require
+from deskew.metrics.strain import flat_error
+from deskew.metrics.stretch import stretch_figures
+from deskew.metrics.triangles import Triangles, signed_areas
+from deskew.types import Floats, Sheet
+
+
+def _upright(points: Floats, triangles: Triangles) -> Floats:
+    """Turn the second axis round if the triangles turn clockwise on the whole."""
+    return points * [1.0, -1.0] if signed_areas(points, triangles).sum() < 0 else points
+
+
+def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bool = False) -> dict[str, float]:
+    """Compare a flattened triangle mesh with its true flat state, and with the surface that it was made of.
+
+    Which side of the surface is its front is told by its faces: from the front they turn counterclockwise. The truth is
+    right by definition and its axes are a convention of its file: a page's v runs down, a texture's up. So a truth
+    that turns clockwise is read with its second axis reversed. The flattening gets no such grace: it has x to the
+    right, y up and should show the front; one that shows the back is mirrored, whatever the truth's axes.
+
+    Parameters
+    ----------
+    sheet : Sheet
+        The bent surface, triangles [mm].
+    truth : (V, 2) array
+        True flat place of each vertex [mm], its axes of either handedness.
+    flat : (V, 2) array
+        Flattened place of each vertex [mm].
+    same_axes : bool
+        The flattening is given in a file of the truth's own kind, so it may also have the truth's handedness: then
+        both read alike.
+
+    Returns
+    -------
+    dict
+        `flat_{mean,max}_mm` and `flat_rigid_{mean,max}_mm` as :func:`deskew.metrics.flat_error`, over the vertices
+        that a face uses; the rest as :func:`deskew.metrics.sheet_stretch`, flips counted as seen from the front.
+
+    Raises
+    ------
+    InputError
+        If the sheet is a grid, or the three do not have the same vertices, all finite.
+    StepError
+        If the flattening is mirrored.
+    """
+    require(sheet.faces is not None, "sheet", "be a triangle mesh", "a grid")
+    faces: Triangles = np.asarray(sheet.faces)
+    for name, points in (("truth", truth), ("flat", flat)):
+        wanted = (len(sheet.vertices), 2)
+        require(points.shape == wanted, name, f"have shape {wanted}", points.shape)
+        require(bool(np.isfinite(points).all()), name, "be finite", "NaN or infinity")
+    right = _upright(truth, faces)
+    if same_axes and right is not truth:
+        flat = _upright(flat, faces)
+    used = np.unique(faces)
+    # flat_error takes page coordinates, whose v runs down.
+    figures = flat_error(flat[used], right[used] * [1.0, -1.0])
+    return figures | stretch_figures(sheet.vertices, flat, faces)
