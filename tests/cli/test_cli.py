@@ -36,7 +36,7 @@ from deskew.types import (
     Status,
 )
 
-COMMANDS = ("calibrate", "scan", "accuracy", "restore", "run")
+COMMANDS = ("calibrate", "scan", "accuracy", "restore", "run", "score")
 SIZE = (12, 8)
 CAMERA = Pinhole(
     SIZE, np.array([[10.0, 0, 5.5], [0, 10, 3.5], [0, 0, 1]]), np.zeros(5), np.eye(3), np.array([0, 0, 9.0])
@@ -465,10 +465,11 @@ def test_the_module_ends_with_the_exit_code() -> None:
 
 def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
     program = (
-        "import sys; from deskew import cli\n"
-        "def restore(found, method, wanted, as_json): wanted.output.touch(); cli._report({}, as_json, wanted.output)\n"
-        "cli._restore = restore\n"
-        "sys.exit(cli.main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
+        "import sys; from deskew.cli import main, printing, restoring\n"
+        "def restore(found, method, wanted, as_json):\n"
+        "    wanted.output.touch(); printing.report({}, as_json, wanted.output)\n"
+        "restoring.restore_page = restore\n"
+        "sys.exit(main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
     )
     with Path("/dev/full").open("w") as full:
         line = [sys.executable, "-c", program]
