@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import typer
 
-from deskew.cli import restoring, scanning, scoring
+from deskew.cli import flattening, restoring, scanning, scoring
 from deskew.cli.printing import say
 from deskew.errors import DeskewError
 
@@ -30,6 +30,7 @@ for _command in (
     scanning.calibrate,
     scanning.scan,
     scanning.accuracy,
+    flattening.flatten,
     restoring.restore,
     restoring.run,
     scoring.score,

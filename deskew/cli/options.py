@@ -34,4 +34,12 @@ Combine = Annotated[
     ),
 ]
 Scale = Annotated[float, typer.Option("--scale", metavar="S", help="Restored pixels for each of the camera's.")]
+Stiffness = Annotated[
+    Path | None,
+    typer.Option(
+        "--stiffness",
+        metavar="MAP.png",
+        help="Grey picture of material labels, with MAP.toml beside it: [stiffness], LABEL = k_s [kg/s^2].",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]

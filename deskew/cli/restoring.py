@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from deskew.cli.flattening import require_method
 from deskew.cli.options import (
     CalibrationFile,
     CaptureFolder,
@@ -19,6 +20,7 @@ from deskew.cli.options import (
     Method,
     Scale,
     Shape,
+    Stiffness,
 )
 from deskew.cli.pictures import PICTURES, Wanted, write_pictures
 from deskew.cli.printing import flattened_figures, projector_figures, report
@@ -32,6 +34,7 @@ def restore(
     scan_file: Annotated[Path, typer.Argument(metavar="SCAN", help="scan.npz from `deskew scan`.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
     method: Method = "paper_euler",
+    stiffness: Stiffness = None,
     lights: Lights = None,
     combine: Combine = None,
     scale: Scale = 1.0,
@@ -41,14 +44,21 @@ def restore(
 
     With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
 
+    A stiffness map has the white image's frame.
+
     Example: deskew restore scan.npz -o restored.png --light white --light uv --combine ratio:uv/white
     """
     from deskew import io
 
     io.require_writable(output, PICTURES)
     wanted = Wanted.of(output, lights, combine, scale)
+    materials = None if stiffness is None else io.read_stiffness(stiffness)
     found = io.read_scan(scan_file)
     wanted.check(list(found.images))
+    if materials is not None:
+        from deskew import pipeline
+
+        found = pipeline.with_stiffness(found, materials)
     restore_page(found, method, wanted, as_json)
 
 
@@ -57,6 +67,7 @@ def run(
     calibration: CalibrationFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
     method: Method = "paper_euler",
+    stiffness: Stiffness = None,
     shape: Shape = (45, 45),
     mask: Mask = None,
     ink: Ink = False,
@@ -70,6 +81,8 @@ def run(
 
     With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
 
+    A stiffness map has the white image's frame.
+
     Example: deskew run page/ --calibration calibration.json -o restored.png --light uv
     """
     from deskew import io
@@ -77,15 +90,8 @@ def run(
     io.require_writable(output, PICTURES)
     require_method(method)
     wanted = Wanted.of(output, lights, combine, scale)
-    how = Scanning(shape, mask, ink, denoise)
+    how = Scanning(shape, mask, ink, denoise, stiffness)
     restore_page(scan_page(capture, io.read_calibration(calibration), how, wanted), method, wanted, as_json)
-
-
-def require_method(method: str) -> None:
-    """Refuse an unknown method before the long work rather than after it."""
-    from deskew.flattening import find_method
-
-    find_method(method)
 
 
 def restore_page(found: Scan, method: str, wanted: Wanted, as_json: bool) -> None:

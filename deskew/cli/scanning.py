@@ -16,6 +16,7 @@ from deskew.cli.printing import depth_figures, projector_figures, report, warn
 from deskew.errors import require
 
 if TYPE_CHECKING:
+    from deskew.io import StiffnessMap
     from deskew.types import (
         Array,
         Calibration,
@@ -66,6 +67,7 @@ class Scanning:
     mask: Path | None
     ink: bool
     denoise: bool
+    stiffness: Path | None = None
 
     def page(self, size: tuple[int, int]) -> Array | None:
         """Read the mask, (height, width) bool."""
@@ -78,6 +80,16 @@ class Scanning:
         require(bool(page.any()), "--mask", "show the page: not black all over", str(self.mask))
         return page
 
+    def materials(self, size: tuple[int, int]) -> StiffnessMap | None:
+        """Read the stiffness map; one of another size than the camera's is refused before the long work."""
+        if self.stiffness is None:
+            return None
+        from deskew import io
+
+        found = io.read_stiffness(self.stiffness)
+        require(found.size == size, str(self.stiffness), f"be {size[0]}x{size[1]} px", "{}x{} px".format(*found.size))
+        return found
+
 
 def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wanted | None = None) -> Scan:
     """Scan a page as asked; what cannot be `wanted` of it is refused before the long work."""
@@ -88,7 +100,7 @@ def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wan
         from deskew.types import WHITE
 
         wanted.check([WHITE, *capture.textures])
-    mask = how.page(capture.camera_size)
+    mask, materials = how.page(capture.camera_size), how.materials(capture.camera_size)
     from deskew import acquisition, pipeline
 
     found = pipeline.scan(
@@ -100,7 +112,7 @@ def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wan
         denoise=acquisition.DenoiseSettings() if how.denoise else None,
     )
     warn(found.projector, folder.name)
-    return found
+    return found if materials is None else pipeline.with_stiffness(found, materials)
 
 
 def calibrate(

@@ -27,8 +27,9 @@ TruthFile = Annotated[
 def score(flat_file: FlatFile, truth_file: TruthFile, as_json: Json = False) -> None:
     """Score a flattening made by any program: distance from the truth, stretch against the bent surface, flips.
 
-    Both files hold the same vertices in the same order, and the same faces. The true v may run up or down; but a
-    flattening that shows the back of the surface (where its faces turn clockwise) is mirrored, and an error.
+    Both files hold the same vertices in the same order, and the same faces. The true v may run up or down. The
+    flattening shows the surface from above, or from the front of its faces if it lies neither up nor down; one that
+    is mirrored is an error, code 3.
 
     Figures: flat_mean_mm and flat_max_mm after an affine fit, flat_rigid_mean_mm and flat_rigid_max_mm after a rigid
     one; stretch_l2 and stretch_linf of the map from the plane to the surface (Sander 2001), stretch_inverse_l2 and

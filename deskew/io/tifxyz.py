@@ -85,7 +85,7 @@ def read_tifxyz(folder: Path, voxel_mm: float, *, largest: bool = False) -> Mesh
         sizes = np.bincount(pieces.ravel())[1:]
         found = f"{n_pieces} pieces of {', '.join(map(str, sorted(sizes.tolist(), reverse=True)[:8]))} quads"
         if not largest:
-            raise InputError(f"`{folder}` must be one connected piece, got {found}; the largest can be asked for.")
+            raise InputError(f"`{folder}` must be one connected piece, got {found}; ask for the `largest` alone.")
         quads = pieces == 1 + int(sizes.argmax())
     faces = grid_faces(rows, columns).reshape(-1, 2, 3)[quads.ravel()].reshape(-1, 3)
     used, compact = np.unique(faces, return_inverse=True)

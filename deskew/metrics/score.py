@@ -7,22 +7,23 @@ import numpy as np
 from deskew.errors import require
 from deskew.metrics.strain import flat_error
 from deskew.metrics.stretch import stretch_figures
-from deskew.metrics.triangles import Triangles, signed_areas
+from deskew.metrics.triangles import Triangles, signed_areas, upward
 from deskew.types import Floats, Sheet
 
 
-def _upright(points: Floats, triangles: Triangles) -> Floats:
-    """Turn the second axis round if the triangles turn clockwise on the whole."""
-    return points * [1.0, -1.0] if signed_areas(points, triangles).sum() < 0 else points
+def _turning(points: Floats, triangles: Triangles, way: float) -> Floats:
+    """Reverse the second axis if that is what makes the triangles turn the given way on the whole."""
+    return points * [1.0, -1.0] if signed_areas(points, triangles).sum() * way < 0 else points
 
 
 def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bool = False) -> dict[str, float]:
     """Compare a flattened triangle mesh with its true flat state, and with the surface that it was made of.
 
-    Which side of the surface is its front is told by its faces: from the front they turn counterclockwise. The truth is
-    right by definition and its axes are a convention of its file: a page's v runs down, a texture's up. So a truth
-    that turns clockwise is read with its second axis reversed. The flattening gets no such grace: it has x to the
-    right, y up and should show the front; one that shows the back is mirrored, whatever the truth's axes.
+    The surface says which way its faces should turn: as they do when it is looked at from above, or from its front if
+    it faces neither up nor down (see `deskew.metrics.triangles.upward`). The truth is right by definition, and its axes
+    are a convention of its file, where v may run up or down: if its faces turn the other way its second axis is
+    reversed. The flattening gets no such grace: it has x to the right and y up, so if its faces turn the other way it
+    is mirrored, whatever the truth's axes.
 
     Parameters
     ----------
@@ -33,14 +34,13 @@ def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bo
     flat : (V, 2) array
         Flattened place of each vertex [mm].
     same_axes : bool
-        The flattening is given in a file of the truth's own kind, so it may also have the truth's handedness: then
-        both read alike.
+        The flattening is given in a file of the truth's own kind, so its v may also run as the truth's does.
 
     Returns
     -------
     dict
         `flat_{mean,max}_mm` and `flat_rigid_{mean,max}_mm` as :func:`deskew.metrics.flat_error`, over the vertices
-        that a face uses; the rest as :func:`deskew.metrics.sheet_stretch`, flips counted as seen from the front.
+        that a face uses; the rest as :func:`deskew.metrics.sheet_stretch`, all signed as said above.
 
     Raises
     ------
@@ -55,10 +55,11 @@ def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bo
         wanted = (len(sheet.vertices), 2)
         require(points.shape == wanted, name, f"have shape {wanted}", points.shape)
         require(bool(np.isfinite(points).all()), name, "be finite", "NaN or infinity")
-    right = _upright(truth, faces)
+    way = upward(sheet)
+    right = _turning(truth, faces, way)
     if same_axes and right is not truth:
-        flat = _upright(flat, faces)
+        flat = _turning(flat, faces, way)
     used = np.unique(faces)
     # flat_error takes page coordinates, whose v runs down.
     figures = flat_error(flat[used], right[used] * [1.0, -1.0])
-    return figures | stretch_figures(sheet.vertices, flat, faces)
+    return figures | stretch_figures(sheet.vertices, flat * [1.0, way], faces)

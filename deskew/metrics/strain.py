@@ -38,8 +38,8 @@ def sheet_strain(sheet: Sheet, flattened: Flattened) -> dict[str, float]:
     old, new = np.linalg.norm(before[i] - before[j], axis=1), np.linalg.norm(after[i] - after[j], axis=1)
     require(float(old.min()) > 0, "sheet", "have no two joined vertices in one place", f"{int((old == 0).sum())} pairs")
     triangles = sheet_triangles(sheet)
-    # The sheet as seen from above says which way is up, so a sheet turned over entirely is all flips.
-    up = upward(before, triangles)
+    # The sheet as scanned says which way is up, so a sheet turned over entirely is all flips.
+    up = upward(sheet)
     figures = {
         "strain_rms": float(np.sqrt(((new / old - 1.0) ** 2).mean())),
         "length_change": float(new.sum() / old.sum() - 1.0),

@@ -94,7 +94,7 @@ def sheet_stretch(sheet: Sheet, flattened: Flattened) -> dict[str, float]:
     Parameters
     ----------
     sheet : Sheet
-        As scanned; its sight from above says which way its triangles should turn.
+        As scanned; that says which way its triangles should turn (see `deskew.metrics.triangles.upward`).
     flattened : Flattened
         The same vertices flattened; only X and Y count.
 
@@ -119,5 +119,4 @@ def sheet_stretch(sheet: Sheet, flattened: Flattened) -> dict[str, float]:
     require(flattened.vertices.shape == shape, "flattened", f"have the sheet's shape {shape}", flattened.vertices.shape)
     surface, flat = sheet.vertices.reshape(-1, 3), flattened.vertices.reshape(-1, 3)[:, :2]
     require(bool(np.isfinite(flat).all()), "flattened", "have finite vertices", "NaN or infinity")
-    triangles = sheet_triangles(sheet)
-    return stretch_figures(surface, flat * [1.0, upward(surface, triangles)], triangles)
+    return stretch_figures(surface, flat * [1.0, upward(sheet)], sheet_triangles(sheet))

@@ -11,6 +11,8 @@ from deskew.types import Floats, Sheet
 
 Triangles = npt.NDArray[np.integer[Any]]
 
+_FACING_DOWN = 0.25  # share of its area; a rolled sheet that is seen by more than its border stays well within
+
 
 def _corner_triangles(rows: int, columns: int) -> Triangles:
     """Return each quad's four corner triangles, (Q, 4, 3): every corner with its two neighbours."""
@@ -48,6 +50,16 @@ def signed_areas(points: Floats, triangles: Triangles) -> Floats:
     return np.asarray(0.5 * (p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]))
 
 
-def upward(points: Floats, triangles: Triangles) -> float:
-    """How the triangles turn as seen from above, on the whole: 1.0 counterclockwise, -1.0 clockwise."""
-    return 1.0 if signed_areas(points, triangles).sum() >= 0 else -1.0
+def upward(sheet: Sheet) -> float:
+    """Which way a sheet's triangles turn when it is looked at as it should be: 1.0 counterclockwise, -1.0 clockwise.
+
+    A sheet is looked at from above. A mesh that faces neither up nor down on the whole, a scroll or a page on edge, has
+    no upper side: it is looked at from its front, where its faces turn counterclockwise.
+    """
+    points, triangles = sheet.vertices.reshape(-1, 3), sheet_triangles(sheet)
+    seen = float(signed_areas(points, triangles).sum())
+    if sheet.faces is None:
+        return 1.0 if seen >= 0 else -1.0
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    whole = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return -1.0 if seen < -_FACING_DOWN * whole else 1.0

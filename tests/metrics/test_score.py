@@ -46,15 +46,29 @@ def test_the_back_of_the_surface_is_mirrored_whichever_way_the_truths_v_runs(axe
         score_flattening(sheet, flat * axes, turned(flat * mirror))
 
 
-def test_faces_that_show_the_other_side_ask_for_the_other_picture() -> None:
-    """The front is where the faces turn counterclockwise: wound the other way, what was right is mirrored."""
+@pytest.mark.parametrize("axes", [V_UP, V_DOWN], ids=["v up", "v down"])
+def test_a_page_is_looked_at_from_above_however_its_faces_are_wound(axes: Floats) -> None:
     sheet, flat = cylinder()
     assert sheet.faces is not None
     behind = Sheet(sheet.vertices, sheet.faces[:, ::-1])
-    for axes in (V_UP, V_DOWN):
-        assert score_flattening(behind, flat * axes, flat * [-1.0, 1.0])["flat_rigid_max_mm"] < 1e-9
-        with pytest.raises(StepError, match="mirrored"):
-            score_flattening(behind, flat * axes, flat)
+    figures = score_flattening(behind, flat * axes, flat)
+    assert figures == pytest.approx(score_flattening(sheet, flat * axes, flat))
+    assert (figures["flips"], figures["flat_rigid_max_mm"]) == (0.0, 0.0)
+    with pytest.raises(StepError, match="mirrored"):
+        score_flattening(behind, flat * axes, flat * [-1.0, 1.0])
+
+
+@pytest.mark.parametrize("axes", [V_UP, V_DOWN], ids=["v up", "v down"])
+def test_a_surface_without_an_upper_side_is_looked_at_from_its_front(axes: Floats) -> None:
+    """On edge nothing is above: the front is where the faces turn counterclockwise."""
+    sheet, flat = cylinder()
+    assert sheet.faces is not None
+    on_edge = sheet.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
+    assert score_flattening(Sheet(on_edge, sheet.faces), flat * axes, turned(flat))["flat_rigid_max_mm"] < 1e-9
+    behind = Sheet(on_edge, sheet.faces[:, ::-1])
+    assert score_flattening(behind, flat * axes, flat * [-1.0, 1.0])["flat_rigid_max_mm"] < 1e-9
+    with pytest.raises(StepError, match="mirrored"):
+        score_flattening(behind, flat * axes, flat)
 
 
 @pytest.mark.parametrize("axes", [V_UP, V_DOWN], ids=["v up", "v down"])
