@@ -34,7 +34,8 @@ def score(flat_file: FlatFile, truth_file: TruthFile, as_json: Json = False) -> 
     Figures: flat_mean_mm and flat_max_mm after an affine fit, flat_rigid_mean_mm and flat_rigid_max_mm after a rigid
     one; stretch_l2 and stretch_linf of the map from the plane to the surface (Sander 2001), stretch_inverse_l2 and
     stretch_inverse_linf of the map from the surface to the plane, infinite (null in JSON) if a face is flipped;
-    area_error, the mean relative change of area; angle_mean_deg; flips, the number of faces turned over.
+    area_error, the mean relative change of area; angle_mean_deg; flips, the number of faces turned over; folds, the
+    number of edges along which the sheet folds over.
 
     Example: deskew score flat.obj --truth page.obj --json
     """

@@ -11,6 +11,7 @@ P. V. Sander, J. Snyder, S. J. Gortler, H. Hoppe, Texture Mapping Progressive Me
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from deskew.errors import require
 from deskew.metrics.triangles import Triangles, sheet_triangles, signed_areas, upward
@@ -45,6 +46,16 @@ def _angles(points: Floats, triangles: Triangles) -> Floats:
     ahead, behind = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     sine = np.sqrt(np.maximum((ahead**2).sum(-1) * (behind**2).sum(-1) - (ahead * behind).sum(-1) ** 2, 0.0))
     return np.asarray(np.degrees(np.arctan2(sine, (ahead * behind).sum(-1))))
+
+
+def _folds(flipped: npt.NDArray[np.bool_], triangles: Triangles) -> int:
+    """Count the edges between a triangle that is flipped and one that is not."""
+    if not flipped.any():
+        return 0
+    ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, edge = np.unique(ends, axis=0, return_inverse=True)
+    n_flipped = np.bincount(edge.ravel(), weights=np.repeat(flipped, 3))
+    return int(((n_flipped > 0) & (n_flipped < np.bincount(edge.ravel()))).sum())
 
 
 def stretch_figures(surface: Floats, flat: Floats, triangles: Triangles) -> dict[str, float]:
@@ -85,6 +96,7 @@ def stretch_figures(surface: Floats, flat: Floats, triangles: Triangles) -> dict
         "area_error": float((weights * np.abs(signed / areas - 1.0)).sum()),
         "angle_mean_deg": float((weights * angles.mean(axis=1)).sum()),
         "flips": float(flipped.sum()),
+        "folds": float(_folds(flipped, triangles)),
     }
 
 
@@ -108,7 +120,8 @@ def sheet_stretch(sheet: Sheet, flattened: Flattened) -> dict[str, float]:
         four are infinite if any triangle is flipped or has no area left.
         `area_error`: mean of ``|A' / A - 1|`` with A' signed, so that a flipped triangle counts 2 and not 0.
         `angle_mean_deg`: mean change of the triangles' angles [degrees], of a flipped one their sum.
-        `flips`: triangles that turn the other way, or have no area left.
+        `flips`: triangles that turn the other way, or have no area left. `folds`: edges along which the sheet folds
+        over, between a triangle that is flipped and one that is not.
 
     Raises
     ------

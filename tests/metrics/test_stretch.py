@@ -21,6 +21,7 @@ PERFECT = {
     "area_error": 0.0,
     "angle_mean_deg": 0.0,
     "flips": 0.0,
+    "folds": 0.0,
 }
 
 
@@ -64,6 +65,7 @@ def test_a_uniform_scale_is_the_stretch_one_way_and_its_reciprocal_the_other(sca
             "area_error": abs(scale**2 - 1),
             "angle_mean_deg": 0.0,
             "flips": 0.0,
+            "folds": 0.0,
         },
         abs=1e-6,
     )
@@ -116,13 +118,14 @@ def test_a_triangle_flipped_or_gone_is_never_perfect(place: str) -> None:
     figures = sheet_stretch(sheet, Flattened(flat, Status.AT_REST))
     infinite = ("stretch_l2", "stretch_linf", "stretch_inverse_l2", "stretch_inverse_linf")
     assert [figures[name] for name in infinite] == [math.inf] * 4
-    assert figures["flips"] == 1.0
+    assert (figures["flips"], figures["folds"]) == (1.0, 1.0)
     assert figures["area_error"] == pytest.approx(1.0 if place == "beyond" else 0.5)
 
 
 def test_a_sheet_turned_over_is_all_flips() -> None:
     figures = mapped(np.diag([-1.0, 1.0]), flat_grid())
     assert (figures["flips"], figures["area_error"]) == (40.0, pytest.approx(2.0))
+    assert figures["folds"] == 0.0  # nowhere does it fold over: it lies on its face
     assert figures["stretch_l2"] == math.inf
 
 
