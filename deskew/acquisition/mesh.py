@@ -16,6 +16,8 @@ from deskew.acquisition.outline import Outline
 from deskew.errors import StepError, is_whole, require
 from deskew.types import DepthMap, Floats, Pinhole, Sheet
 
+# About how far apart the surface between the mesh's vertices is sampled, for rest lengths along it [px].
+SECTION_STEP_PX = 3.0
 # Spacing at which a side's length in space is measured [px]: wide enough for depth noise not to lengthen it unevenly.
 SIDE_STEP_PX = 3.0
 
@@ -40,7 +42,12 @@ class PageMesh:
 
 
 def page_mesh(
-    depth: DepthMap, outline: Outline, shape: tuple[int, int] = (45, 45), *, max_hole_px: float = 12.0
+    depth: DepthMap,
+    outline: Outline,
+    shape: tuple[int, int] = (45, 45),
+    *,
+    max_hole_px: float = 12.0,
+    refine: int | None = None,
 ) -> PageMesh:
     """Span a grid over the page and lift it into space by the depth map.
 
@@ -58,6 +65,8 @@ def page_mesh(
         Vertices of the mesh, from 2 x 2 to 1000 x 1000.
     max_hole_px : float
         Depth is carried over the page's rim and over holes up to this distance from measured depth [px].
+    refine : int, optional
+        Steps of the sheet's `surface` between two vertices; if not given, such that a step is about 3 pixels.
 
     Returns
     -------
@@ -73,15 +82,25 @@ def page_mesh(
     sound = isinstance(shape, Sequence) and len(shape) == 2 and all(is_whole(n, 2, 1000) for n in shape)
     require(sound, "shape", "be (rows, columns) of at least 2 x 2 vertices, at most 1000 x 1000", shape)
     filled = fill_depth(depth, outline, max_hole_px)
-    rows, columns = shape
+    n = refine or _refinement(outline, shape)
+    rows, columns = ((size - 1) * n + 1 for size in shape)
     top = _even_nodes(outline.top, filled, depth.camera, columns)
     bottom = _even_nodes(outline.bottom, filled, depth.camera, columns)
     left = _even_nodes(outline.left, filled, depth.camera, rows)
     right = _even_nodes(outline.right, filled, depth.camera, rows)
-    nodes = coons_grid(top, right, bottom, left)
+    fine = coons_grid(top, right, bottom, left)
+    nodes = np.ascontiguousarray(fine[::n, ::n])
     _require_unfolded(nodes)
-    vertices = _lift(nodes, filled, depth.camera)
-    return PageMesh(Sheet(vertices, cut=_cut_quads(nodes, filled)), nodes, _filled_fraction(nodes, filled))
+    surface = _lift(fine, filled, depth.camera)
+    sheet = Sheet(surface[::n, ::n], cut=_cut_quads(nodes, filled), surface=surface if n > 1 else None)
+    return PageMesh(sheet, nodes, _filled_fraction(nodes, filled))
+
+
+def _refinement(outline: Outline, shape: tuple[int, int]) -> int:
+    """How many steps of the surface to a quad: of about `SECTION_STEP_PX`, along the outline's longest side."""
+    sides = ((outline.top, shape[1]), (outline.bottom, shape[1]), (outline.left, shape[0]), (outline.right, shape[0]))
+    spacing = max(np.linalg.norm(np.diff(side, axis=0), axis=1).sum() / (n - 1) for side, n in sides)
+    return max(1, round(float(spacing) / SECTION_STEP_PX))
 
 
 def page_sheet(

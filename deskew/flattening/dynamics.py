@@ -17,7 +17,7 @@ from deskew.flattening.contact import Plane
 from deskew.flattening.forces import System, spring_energy, system
 from deskew.flattening.integrators import CONTACTS, EVALUATIONS, REJECTED, STEPS, Run, Scheme, advance, start
 from deskew.flattening.settings import ParticleSettings
-from deskew.flattening.springs import Springs, chord_springs
+from deskew.flattening.springs import Springs, grid_springs
 from deskew.flattening.stability import largest_stable_step, stiffest_mode
 from deskew.types import Array, Flattened, Floats, Sheet, Status
 
@@ -146,7 +146,7 @@ def settle(sheet: Sheet, scheme: Scheme, settings: ParticleSettings) -> Flattene
         and the constants chosen: `k_d` [kg/s], `gravity`, `weak_gravity` [mm/s^2] and `drag`
         [kg/s].
     """
-    springs = chord_springs(sheet, settings.k_s)
+    springs = grid_springs(sheet, settings.springs)
     vertices = sheet.vertices - [0.0, 0.0, sheet.vertices[..., 2].min()]
     x = np.ascontiguousarray(vertices.reshape(-1, 3).T)
     constants = choose_constants(springs, x, scheme, settings)

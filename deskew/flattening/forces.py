@@ -30,8 +30,8 @@ class System(NamedTuple):
 
     Attributes
     ----------
-    rest, k_s : (4, V) arrays
-        Rest lengths [mm] and spring constants [kg/s^2], by family, as in `Springs`.
+    rest, k_s : (F, V) arrays
+        Rest lengths [mm] and spring constants [kg/s^2], by family, as in `Springs`; F is 4 or 8.
     columns : int
         Vertices in a row of the grid.
     beta : float
@@ -55,8 +55,8 @@ class System(NamedTuple):
 
 def system(springs: Springs, *, beta: float, mass: float, gravity: float, drag: float) -> System:
     """Lay springs out for the compiled passes; units as in `System`."""
-    rest = np.ascontiguousarray(springs.rest, dtype=np.float64).reshape(4, -1)
-    k_s = np.ascontiguousarray(springs.k_s, dtype=np.float64).reshape(4, -1)
+    rest = np.ascontiguousarray(springs.rest, dtype=np.float64).reshape(len(springs.rest), -1)
+    k_s = np.ascontiguousarray(springs.k_s, dtype=np.float64).reshape(rest.shape)
     return System(rest, k_s, springs.grid[1], float(beta), float(mass), float(gravity), float(drag))
 
 
@@ -102,6 +102,36 @@ def _hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: igno
             out[axis, j + uintp(start + columns + 1)] -= falling[j]
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _offsets(family, columns):  # type: ignore[no-untyped-def]
+    """Return where a family's springs begin and end, counted in vertices from the one that they are stored at."""
+    steps = 1 if family < 4 else 2
+    tail = steps * columns if family % 4 == 3 else 0
+    head = steps * (1, columns, columns + 1, 1)[family % 4]
+    return tail, head
+
+
+@njit(cache=True, error_model="numpy")
+def _pull_far(x, v, physics, inverse_mass, out):  # type: ignore[no-untyped-def]
+    """Add what the springs of two steps do (eqs. 1 and 2); few use them, so they take the plain way."""
+    for family in range(4, len(physics.k_s)):
+        tail, head = _offsets(family, physics.columns)
+        for i in range(x.shape[1] - max(tail, head)):
+            k_s = physics.k_s[family, i]
+            if k_s > 0.0:
+                a, b = i + tail, i + head
+                squared, closing = 0.0, 0.0
+                for axis in range(3):
+                    squared += (x[axis, b] - x[axis, a]) ** 2
+                    closing += (v[axis, b] - v[axis, a]) * (x[axis, b] - x[axis, a])
+                length = np.sqrt(squared)
+                scale = k_s * ((length - physics.rest[family, i]) * length + physics.beta * closing) / squared
+                for axis in range(3):
+                    pull = scale * inverse_mass * (x[axis, b] - x[axis, a])
+                    out[axis, a] += pull
+                    out[axis, b] -= pull
+
+
 @njit(cache=True, error_model="numpy")
 def accelerate(x, v, physics, work, out):  # type: ignore[no-untyped-def]
     """Acceleration of every particle, f / m of eq. 5.
@@ -137,6 +167,8 @@ def accelerate(x, v, physics, work, out):  # type: ignore[no-untyped-def]
         work[3:6, down - start : row - start] = 0.0
         work[6:12, shear - start : row - start] = 0.0
         _hand_out(work, start, row - start, down - start, shear - start, columns, out)
+    if len(k_s) > 4:
+        _pull_far(x, v, physics, inverse, out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,9 +184,8 @@ def spring_energy(x, physics):  # type: ignore[no-untyped-def]
     """
     n, columns = x.shape[1], physics.columns
     energy = 0.0
-    for family in range(4):
-        tail = columns if family == 3 else 0
-        head = (1, columns, columns + 1, 1)[family]
+    for family in range(len(physics.k_s)):
+        tail, head = _offsets(family, columns)
         for i in range(n - max(tail, head)):
             k_s = physics.k_s[family, i]
             if k_s > 0.0:

@@ -11,7 +11,8 @@ import numpy as np
 from deskew.errors import DeskewError, InputError, StepError, in_one_line, require
 from deskew.flattening.dynamics import settle
 from deskew.flattening.integrators import INTEGRATORS
-from deskew.flattening.settings import particle_settings
+from deskew.flattening.settings import ParticleSettings, StaticSettings, settings_of
+from deskew.flattening.statics import flatten_grid
 from deskew.types import Flattened, Sheet, Status
 
 Flattener = Callable[..., Flattened]
@@ -21,15 +22,24 @@ def _particles(integrator: str) -> Flattener:
     """Make the paper's method out of an integrator's name."""
 
     def flatten_with(sheet: Sheet, **settings: object) -> Flattened:
-        return settle(sheet, INTEGRATORS[integrator], particle_settings(**settings))
+        return settle(sheet, INTEGRATORS[integrator], settings_of(ParticleSettings, "the particle system", settings))
 
     return flatten_with
 
 
+def _spring(sheet: Sheet, **settings: object) -> Flattened:
+    """Solve the springs for rest on the plane."""
+    chosen = settings_of(StaticSettings, "the static solver", settings)
+    return flatten_grid(sheet, chosen)
+
+
 METHODS: dict[str, Flattener] = {
+    "spring": _spring,
     "paper_euler": _particles("euler"),
     "paper_rk4": _particles("rk4"),
 }
+
+DEFAULT = "spring"
 
 
 def find_method(name: str) -> Flattener:
@@ -62,7 +72,7 @@ def find_method(name: str) -> Flattener:
     return function
 
 
-def flatten(sheet: Sheet, *, method: str = "paper_euler", **settings: object) -> Flattened:
+def flatten(sheet: Sheet, *, method: str = DEFAULT, **settings: object) -> Flattened:
     """Flatten a sheet onto Z = 0.
 
     Parameters
@@ -70,9 +80,10 @@ def flatten(sheet: Sheet, *, method: str = "paper_euler", **settings: object) ->
     sheet : Sheet
         The surface in the world [mm].
     method : str
-        `paper_euler` or `paper_rk4` (the paper's particle system, section 3), or `package.module:function`.
+        `spring` (the same springs solved for rest at once), `paper_euler` or `paper_rk4` (the paper's particle system,
+        section 3), or `package.module:function`.
     **settings
-        Of the method; for the particle system, the fields of `ParticleSettings`.
+        Of the method: the fields of `StaticSettings` for `spring`, of `ParticleSettings` for the particle system.
 
     Returns
     -------

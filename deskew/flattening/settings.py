@@ -1,8 +1,9 @@
-"""Parameters of the particle system, with their units and ranges."""
+"""Parameters of springs, of the particle system and of the static solver, with their units and ranges."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import TypeVar
 
 from deskew.errors import require, require_whole
 from deskew.flattening.contact import READINGS
@@ -10,6 +11,82 @@ from deskew.flattening.contact import READINGS
 # Beyond these the arithmetic overflows or the step vanishes, long before anything is physical.
 SMALLEST, LARGEST = 1e-9, 1e12
 MAX_STEPS = 1_000_000_000
+RESTS = ("chord", "section")
+ENERGIES = ("springs", "arap")
+AUTO = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class SpringSettings:
+    """Which springs hold a grid together.
+
+    Attributes
+    ----------
+    k_s : float
+        Spring constant [kg/s^2], in [1e-9, 1e12]; only its ratio to other constants matters. A sheet's own `stiffness`
+        wins.
+    rest : str
+        Rest lengths: "chord", the paper's, or "section", the arc that the sheet's `surface` takes between the ends of
+        a spring; of a sheet without one these are its chords.
+    bending, more : float
+        Constants of the springs two structural and two shear springs long, in units of the weaker of the two; in
+        [0, 1000], 0 for none.
+    """
+
+    k_s: float = 1.0
+    rest: str = "chord"
+    bending: float = 0.0
+    more: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_constant("k_s", self.k_s, "kg/s^2")
+        require(self.rest in RESTS, "rest", f"be one of {', '.join(RESTS)}", repr(self.rest))
+        for name in ("bending", "more"):
+            value = getattr(self, name)
+            require(_is_number(value) and 0 <= value <= 1000, name, "be a number in [0, 1000]", repr(value))
+
+
+@dataclass(frozen=True, slots=True)
+class StaticSettings:
+    """How the springs' energy is minimised on the plane.
+
+    Attributes
+    ----------
+    k_s, rest, bending, more
+        As in `SpringSettings`, but `rest` is "section" unless asked for otherwise.
+    energy : str
+        "springs", or "arap": as rigid as possible on the same lengths.
+    noise_mm : float or "auto"
+        Standard deviation of the scanner's noise across the sheet [mm], in [0, 1000], which is removed before lengths
+        are taken; "auto" estimates it from the mesh.
+    tolerance : float
+        Change of a coordinate in one iteration that counts as none, in units of the sheet's size, in [1e-12, 1e-2].
+    max_iterations : int
+        In [1, 1e9].
+    """
+
+    k_s: float = 1.0
+    rest: str = "section"
+    bending: float = 0.0
+    more: float = 0.0
+    energy: str = "springs"
+    noise_mm: float | str = 0.0
+    tolerance: float = 1e-6
+    max_iterations: int = 2000
+
+    def __post_init__(self) -> None:
+        _ = self.springs
+        require(self.energy in ENERGIES, "energy", f"be one of {', '.join(ENERGIES)}", repr(self.energy))
+        noise = self.noise_mm == AUTO or (_is_number(self.noise_mm) and 0 <= float(self.noise_mm) <= 1000)
+        require(noise, "noise_mm", 'be "auto" or in [0, 1000] mm', repr(self.noise_mm))
+        fine = _is_number(self.tolerance) and 1e-12 <= self.tolerance <= 1e-2
+        require(fine, "tolerance", "be a number in [1e-12, 0.01]", repr(self.tolerance))
+        require_whole("max_iterations", self.max_iterations, 1, MAX_STEPS)
+
+    @property
+    def springs(self) -> SpringSettings:
+        """The springs' own settings."""
+        return SpringSettings(self.k_s, self.rest, self.bending, self.more)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +126,8 @@ class ParticleSettings:
         Steps after which the sheet counts as locked, in [1, 1e9].
     halving : str
         Reading of the paper's step halving, "working" or "literal" (see `contact`).
+    rest, bending, more
+        As in `SpringSettings`.
     """
 
     k_s: float = 1.0
@@ -62,14 +141,16 @@ class ParticleSettings:
     eps_mm: float = 0.05
     max_steps: int = 40_000
     halving: str = "working"
+    rest: str = "chord"
+    bending: float = 0.0
+    more: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, unit in (("k_s", "kg/s^2"), ("mass", "kg"), ("eps_mm", "mm"), ("dt", "s")):
+        _ = self.springs
+        for name, unit in (("mass", "kg"), ("eps_mm", "mm"), ("dt", "s")):
             value = getattr(self, name)
-            if name == "dt" and value is None:
-                continue
-            allowed = _is_number(value) and SMALLEST <= value <= LARGEST
-            require(allowed, name, f"be a number in [{SMALLEST:g}, {LARGEST:g}] [{unit}]", repr(value))
+            if name != "dt" or value is not None:
+                require_constant(name, value, unit)
         for name, unit in (("k_d", "kg/s"), ("gravity", "mm/s^2"), ("weak_gravity", "mm/s^2"), ("drag", "kg/s")):
             value = getattr(self, name)
             if value is not None:
@@ -79,21 +160,35 @@ class ParticleSettings:
         require_whole("max_steps", self.max_steps, 1, MAX_STEPS)
         require(self.halving in READINGS, "halving", f"be one of {', '.join(READINGS)}", repr(self.halving))
 
+    @property
+    def springs(self) -> SpringSettings:
+        """The springs' own settings."""
+        return SpringSettings(self.k_s, self.rest, self.bending, self.more)
+
+
+def require_constant(name: str, value: object, unit: str) -> None:
+    """Raise an InputError unless `value` is a number in [1e-9, 1e12], in `unit`."""
+    allowed = isinstance(value, int | float) and not isinstance(value, bool) and SMALLEST <= value <= LARGEST
+    require(allowed, name, f"be a number in [{SMALLEST:g}, {LARGEST:g}] [{unit}]", repr(value))
+
 
 def _is_number(value: object) -> bool:
     """Whether `value` is a number at all; its range is asked for where it is known, which NaN is outside of."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
-def particle_settings(**values: object) -> ParticleSettings:
-    """Check keyword arguments into settings.
+Settings = TypeVar("Settings", ParticleSettings, StaticSettings)
+
+
+def settings_of(kind: type[Settings], what: str, values: dict[str, object]) -> Settings:
+    """Check keyword arguments into settings of a kind; `what` is what they set.
 
     Raises
     ------
     InputError
         On a name that is not a setting, or a value out of its range.
     """
-    known = [field.name for field in fields(ParticleSettings)]
+    known = [field.name for field in fields(kind)]
     for name in values:
-        require(name in known, name, f"be a setting of the particle system ({', '.join(known)})", "an unknown name")
-    return ParticleSettings(**values)  # type: ignore[arg-type]
+        require(name in known, name, f"be a setting of {what} ({', '.join(known)})", "an unknown name")
+    return kind(**values)  # type: ignore[arg-type]

@@ -3,23 +3,29 @@
 Springs are stored by the grid, not as a list: family `f`, row `r` and column `c` name the spring that joins vertex
 (r, c) + `TAILS[f]` to vertex (r, c) + `HEADS[f]`. The force pass then walks along rows without an index table, which
 is what lets a compiler use vector instructions.
+
+"More springs may be used to create additional rigidity": the same four families two steps long. Their rest length is
+the sum of the two springs that they span, never a straight chord, which would fold the sheet at every crease. Those
+that span structural springs resist bending (Provot's flexion springs).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from deskew.errors import require
-from deskew.flattening.settings import LARGEST, SMALLEST
+from deskew.flattening.settings import LARGEST, SMALLEST, SpringSettings
 from deskew.types import Array, Floats, Sheet
 
-# Provot's names: two families of structural springs and two of shear springs.
+# Provot's names: two families of structural springs and two of shear springs; then the same two steps long.
 FAMILIES = ("structural_row", "structural_column", "shear_down", "shear_up")
-TAILS = ((0, 0), (0, 0), (0, 0), (1, 0))
-HEADS = ((0, 1), (1, 0), (1, 1), (0, 1))
+TAILS = ((0, 0), (0, 0), (0, 0), (1, 0), (0, 0), (0, 0), (0, 0), (2, 0))
+HEADS = ((0, 1), (1, 0), (1, 1), (0, 1), (0, 2), (2, 0), (2, 2), (0, 2))
 # Squares and energies of lengths beyond these overflow or vanish.
 SHORTEST_MM, FARTHEST_MM = 1e-9, 1e9
 
@@ -30,9 +36,10 @@ class Springs:
 
     Attributes
     ----------
-    rest : (4, R, C) array
-        Rest length r of eq. 1 [mm], by family; 0 where the grid ends and there is no spring.
-    k_s : (4, R, C) array
+    rest : (F, R, C) array
+        Rest length r of eq. 1 [mm], by family; 0 where the grid ends and there is no spring. F is 4, or 8 with springs
+        two steps long.
+    k_s : (F, R, C) array
         Spring constant [kg/s^2]; 0 where there is no spring.
     """
 
@@ -40,7 +47,8 @@ class Springs:
     k_s: Floats
 
     def __post_init__(self) -> None:
-        require(self.rest.ndim == 3 and len(self.rest) == 4, "rest", "have shape (4, R, C)", self.rest.shape)
+        sound = self.rest.ndim == 3 and len(self.rest) in (4, 8)
+        require(sound, "rest", "have shape (4, R, C) or (8, R, C)", self.rest.shape)
         require(self.k_s.shape == self.rest.shape, "k_s", f"have rest's shape {self.rest.shape}", self.k_s.shape)
 
     @property
@@ -76,7 +84,7 @@ class Springs:
         """
         index = np.arange(self.rest[0].size).reshape(self.grid)
         tails, heads, rests, constants = [], [], [], []
-        for family in range(len(FAMILIES)):
+        for family in range(len(self.rest)):
             a, b = _ends(index, family)
             tails.append(a.ravel())
             heads.append(b.ravel())
@@ -109,14 +117,23 @@ def chord_lengths(vertices: Floats) -> Floats:
         Lengths [mm], by family, 0 where there is no spring.
     """
     lengths = np.zeros((4, *vertices.shape[:2]))
-    for family in range(len(FAMILIES)):
-        a, b = _ends(vertices, family)
-        d = b - a
-        # Written as the force pass writes it, so that an unmoved spring exerts exactly no force.
-        lengths[family, : d.shape[0], : d.shape[1]] = np.sqrt(
-            d[..., 0] * d[..., 0] + d[..., 1] * d[..., 1] + d[..., 2] * d[..., 2]
-        )
+    _measure_chords(np.ascontiguousarray(vertices, dtype=np.float64), lengths)
     return lengths
+
+
+@njit(cache=True)
+def _measure_chords(vertices, lengths):  # type: ignore[no-untyped-def]
+    rows, columns = lengths.shape[1], lengths.shape[2]
+    for family in range(4):
+        # Tails and heads of the four families, spelled out for the compiler.
+        i, p, q = (1 if family == 3 else 0), (1 if family == 1 or family == 2 else 0), (0 if family == 1 else 1)
+        for r in range(rows - max(i, p)):
+            for c in range(columns - q):
+                dx = vertices[r + p, c + q, 0] - vertices[r + i, c, 0]
+                dy = vertices[r + p, c + q, 1] - vertices[r + i, c, 1]
+                dz = vertices[r + p, c + q, 2] - vertices[r + i, c, 2]
+                # Written as the force pass writes it, so that an unmoved spring exerts exactly no force.
+                lengths[family, r, c] = np.sqrt(dx * dx + dy * dy + dz * dz)
 
 
 def spring_constants(
@@ -160,20 +177,62 @@ def spring_constants(
     return constants
 
 
-def chord_springs(sheet: Sheet, k_s: float) -> Springs:
-    """Attach the paper's springs to a sheet: at rest as it was scanned, each as long as its chord (section 3.4).
+def section_lengths(surface: Floats, n: int) -> Floats:
+    """Length of every spring of a grid as the arc that the surface takes between its ends.
+
+    The arc is followed along the finer samples: along their rows, their columns and their diagonals.
+
+    Parameters
+    ----------
+    surface : ((R - 1) n + 1, (C - 1) n + 1, 3) array
+        The surface, n steps to one of the grid [mm].
+    n : int
+        Steps of the surface between two neighbours of the grid.
+
+    Returns
+    -------
+    (4, R, C) array
+        Lengths [mm], by family, 0 where there is no spring.
+    """
+    fine = chord_lengths(surface)
+    rows, columns = (surface.shape[0] - 1) // n + 1, (surface.shape[1] - 1) // n + 1
+    lengths = np.zeros((4, rows, columns))
+    for step in range(n):
+        lengths[0, :, :-1] += fine[0, ::n, step::n][:, : columns - 1]
+        lengths[1, :-1, :] += fine[1, step::n, ::n][: rows - 1]
+        lengths[2, :-1, :-1] += fine[2, step::n, step::n][: rows - 1, : columns - 1]
+        lengths[3, :-1, :-1] += fine[3, n - 1 - step :: n, step::n][: rows - 1, : columns - 1]
+    return lengths
+
+
+def _two_steps(one: Floats, join: Callable[[Floats, Floats], Floats]) -> Floats:
+    """Join each spring's value (4, R, C) with that of the next spring in its own direction; 0 where there is none."""
+    two = np.zeros_like(one)
+    two[0, :, :-2] = join(one[0, :, :-2], one[0, :, 1:-1])
+    two[1, :-2, :] = join(one[1, :-2, :], one[1, 1:-1, :])
+    two[2, :-2, :-2] = join(one[2, :-2, :-2], one[2, 1:-1, 1:-1])
+    two[3, :-2, :-2] = join(one[3, 1:-1, :-2], one[3, :-2, 1:-1])
+    return two
+
+
+def _weaker(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.minimum(a, b))
+
+
+def grid_springs(sheet: Sheet, settings: SpringSettings) -> Springs:
+    """Attach springs to a sheet that is at rest as it was scanned (section 3.4).
 
     Parameters
     ----------
     sheet : Sheet
-        A grid; its `stiffness`, where given, replaces `k_s`.
-    k_s : float
-        Uniform spring constant [kg/s^2].
+        A grid; its `stiffness`, where given, replaces the uniform `k_s`.
+    settings : SpringSettings
+        Rest lengths and which springs there are.
 
     Returns
     -------
     Springs
-        With rest length = chord.
+        Of 4 families, or of 8 where `bending` or `more` is not 0.
 
     Raises
     ------
@@ -188,9 +247,18 @@ def chord_springs(sheet: Sheet, k_s: float) -> Springs:
         low, high = float(sheet.stiffness.min()), float(sheet.stiffness.max())
         sound = low >= SMALLEST and high <= LARGEST
         require(sound, "stiffness", f"be in [{SMALLEST:g}, {LARGEST:g}] [kg/s^2]", f"{low:g} to {high:g}")
-    rest = chord_lengths(sheet.vertices)
-    constants = spring_constants((rows, columns), k_s, sheet.stiffness, sheet.cut)
+    if settings.rest == "section" and sheet.surface is not None:
+        rest = section_lengths(sheet.surface, sheet.refinement)
+    else:
+        rest = chord_lengths(sheet.vertices)
+    constants = spring_constants((rows, columns), settings.k_s, sheet.stiffness, sheet.cut)
     rest[constants == 0] = 0.0
     coincident = int(((rest < SHORTEST_MM) & (constants > 0)).sum())
     require(coincident == 0, "vertices", "be distinct along every edge and diagonal", f"{coincident} coincident pairs")
+    if settings.bending or settings.more:
+        longer = _two_steps(constants, _weaker)
+        longer[:2] *= settings.bending
+        longer[2:] *= settings.more
+        rest = np.concatenate([rest, np.where(longer > 0, _two_steps(rest, np.add), 0.0)])
+        constants = np.concatenate([constants, longer])
     return Springs(rest, constants)

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from deskew.flattening.forces import CHUNK, accelerate, scratch, spring_energy, system
-from deskew.flattening.springs import Springs, chord_springs
+from deskew.flattening.settings import SpringSettings
+from deskew.flattening.springs import Springs, grid_springs
 from deskew.types import Array, Sheet
 from tests.flattening.bent_sheets import flat_grid
 
@@ -30,7 +31,9 @@ def crumpled(seed: int, shape: tuple[int, int] = (9, 11)) -> tuple[Springs, Arra
     """Springs of mixed stiffness, and a moved shape and velocities (V, 3) that strain them."""
     rng = np.random.default_rng(seed)
     stiffness = rng.uniform(0.5, 2.0, (shape[0] - 1, shape[1] - 1))
-    springs = chord_springs(Sheet(flat_grid(shape) + rng.normal(0, 0.5, (*shape, 3)), stiffness=stiffness), 1.0)
+    springs = grid_springs(
+        Sheet(flat_grid(shape) + rng.normal(0, 0.5, (*shape, 3)), stiffness=stiffness), SpringSettings(1.0)
+    )
     x = flat_grid(shape) + rng.normal(0, 0.8, (*shape, 3))
     return springs, x.reshape(-1, 3), rng.normal(0, 10.0, (shape[0] * shape[1], 3))
 
@@ -112,7 +115,7 @@ def test_rigid_motion_is_not_damped(motion: str) -> None:
 def test_sheet_at_its_rest_lengths_exerts_exactly_no_force() -> None:
     vertices = flat_grid() + np.random.default_rng(0).normal(0, 1, (9, 11, 3))
     x = vertices.reshape(-1, 3)
-    assert not forces(x, np.zeros_like(x), chord_springs(Sheet(vertices), 3.0), 0.3).any()
+    assert not forces(x, np.zeros_like(x), grid_springs(Sheet(vertices), SpringSettings(3.0)), 0.3).any()
 
 
 def test_stiffer_quad_changes_forces_at_its_corners_alone() -> None:

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from deskew.flattening.contact import Plane
 from deskew.flattening.forces import System, accelerate, scratch, system
 from deskew.flattening.integrators import EVALUATIONS, Run, runge_kutta
-from deskew.flattening.springs import Springs, chord_springs
+from deskew.flattening.settings import SpringSettings
+from deskew.flattening.springs import Springs, grid_springs
 from deskew.types import Array, Sheet
 from tests.flattening.bent_sheets import flat_grid, free_particles
 
@@ -23,7 +24,7 @@ ORDER = {"euler": 1, "rk4": 4}
 def thrown_sheet() -> tuple[Array, Array, System]:
     """A strained, moving sheet in the air, with every force in play."""
     rng = np.random.default_rng(7)
-    springs = chord_springs(Sheet(flat_grid((4, 5))), 1.0)
+    springs = grid_springs(Sheet(flat_grid((4, 5))), SpringSettings(1.0))
     vertices = flat_grid((4, 5)) + rng.normal(0, 0.5, (4, 5, 3))
     return vertices, rng.normal(0, 3.0, (20, 3)), system(springs, beta=0.2, mass=1.0, gravity=9.0, drag=0.1)
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from deskew.errors import InputError
-from deskew.flattening.springs import chord_springs
+from deskew.flattening.settings import SpringSettings
+from deskew.flattening.springs import grid_springs
 from deskew.types import Sheet
 from tests.flattening.bent_sheets import flat_grid
 
@@ -18,7 +19,7 @@ def joined(grid: tuple[int, int]) -> set[frozenset[int]]:
 
 @pytest.mark.parametrize("grid", [(2, 2), (2, 5), (4, 3), (6, 7)])
 def test_every_quad_has_its_hull_and_both_diagonals_once(grid: tuple[int, int]) -> None:
-    a, b, rest, k_s = chord_springs(Sheet(flat_grid(grid)), 3.0).pairs()
+    a, b, rest, k_s = grid_springs(Sheet(flat_grid(grid)), SpringSettings(3.0)).pairs()
     pairs = [frozenset((int(i), int(j))) for i, j in zip(a, b, strict=True)]
     assert len(pairs) == len(set(pairs))
     assert set(pairs) == joined(grid)
@@ -28,7 +29,7 @@ def test_every_quad_has_its_hull_and_both_diagonals_once(grid: tuple[int, int]) 
 
 def test_rest_lengths_are_the_chords_of_the_scan() -> None:
     vertices = flat_grid() + np.random.default_rng(1).normal(0, 1, (9, 11, 3))
-    a, b, rest, _ = chord_springs(Sheet(vertices), 1.0).pairs()
+    a, b, rest, _ = grid_springs(Sheet(vertices), SpringSettings(1.0)).pairs()
     points = vertices.reshape(-1, 3)
     np.testing.assert_allclose(rest, np.linalg.norm(points[a] - points[b], axis=1), rtol=1e-14)
 
@@ -36,7 +37,7 @@ def test_rest_lengths_are_the_chords_of_the_scan() -> None:
 def test_stiffness_of_a_quad_reaches_only_its_own_springs() -> None:
     stiffness = np.ones((8, 10))
     stiffness[3, 4] = 9.0
-    a, b, _, k_s = chord_springs(Sheet(flat_grid(), stiffness=stiffness), 100.0).pairs()
+    a, b, _, k_s = grid_springs(Sheet(flat_grid(), stiffness=stiffness), SpringSettings(100.0)).pairs()
     index = np.arange(99).reshape(9, 11)
     corners = set(index[3:5, 4:6].ravel().tolist())
     changed = {frozenset((int(i), int(j))) for i, j, k in zip(a, b, k_s, strict=True) if k != 1.0}
@@ -46,27 +47,27 @@ def test_stiffness_of_a_quad_reaches_only_its_own_springs() -> None:
 
 def test_springs_on_the_border_take_their_only_quads_stiffness() -> None:
     stiffness = np.full((8, 10), 2.0)
-    assert set(chord_springs(Sheet(flat_grid(), stiffness=stiffness), 1.0).pairs()[3].tolist()) == {2.0}
+    assert set(grid_springs(Sheet(flat_grid(), stiffness=stiffness), SpringSettings(1.0)).pairs()[3].tolist()) == {2.0}
 
 
 def test_coincident_neighbours_are_refused() -> None:
     vertices = flat_grid()
     vertices[2, 3] = vertices[3, 4]
     with pytest.raises(InputError, match=r"`vertices` must be distinct .* got 1 coincident pairs"):
-        chord_springs(Sheet(vertices), 1.0)
+        grid_springs(Sheet(vertices), SpringSettings(1.0))
 
 
 def test_triangle_mesh_is_refused() -> None:
     mesh = Sheet(np.eye(3), faces=np.array([[0, 1, 2]]))
     with pytest.raises(InputError, match=r"`sheet` must be an \(R, C, 3\) grid"):
-        chord_springs(mesh, 1.0)
+        grid_springs(mesh, SpringSettings(1.0))
 
 
 def test_a_cut_quad_has_no_springs_of_its_own_and_its_neighbours_keep_theirs() -> None:
     x, y = np.meshgrid(np.arange(5.0), np.arange(4.0))
     cut = np.zeros((3, 4), dtype=bool)
     cut[:, 2] = True
-    springs = chord_springs(Sheet(np.stack([x, y, 0 * x], -1), cut=cut), 10.0)
+    springs = grid_springs(Sheet(np.stack([x, y, 0 * x], -1), cut=cut), SpringSettings(10.0))
     assert np.array_equal(springs.cut, cut)
     a, b, rest, k_s = springs.pairs()
     joined = k_s > 0
@@ -80,7 +81,7 @@ def test_a_cut_quad_has_no_springs_of_its_own_and_its_neighbours_keep_theirs() -
 def test_a_sheet_in_one_piece_has_the_springs_of_a_sheet_that_says_nothing() -> None:
     x, y = np.meshgrid(np.arange(5.0), np.arange(4.0))
     vertices = np.stack([x, y, np.sin(x)], -1)
-    plain = chord_springs(Sheet(vertices), 10.0)
-    told = chord_springs(Sheet(vertices, cut=np.zeros((3, 4), dtype=bool)), 10.0)
+    plain = grid_springs(Sheet(vertices), SpringSettings(10.0))
+    told = grid_springs(Sheet(vertices, cut=np.zeros((3, 4), dtype=bool)), SpringSettings(10.0))
     assert np.array_equal(plain.k_s, told.k_s)
     assert np.array_equal(plain.rest, told.rest)

@@ -6,7 +6,8 @@ import pytest
 from deskew.flattening.contact import Plane
 from deskew.flattening.forces import spring_energy, system
 from deskew.flattening.integrators import INTEGRATORS, advance, start
-from deskew.flattening.springs import chord_springs
+from deskew.flattening.settings import SpringSettings
+from deskew.flattening.springs import grid_springs
 from deskew.flattening.stability import largest_stable_step, stiffest_mode
 from deskew.types import Sheet
 from tests.flattening.bent_sheets import flat_grid
@@ -15,7 +16,7 @@ from tests.flattening.bent_sheets import flat_grid
 def test_stiffest_mode_is_the_largest_eigenvalue_of_the_dense_matrix() -> None:
     rng = np.random.default_rng(0)
     vertices = flat_grid() + rng.normal(0, 0.3, (9, 11, 3))
-    springs = chord_springs(Sheet(vertices, stiffness=rng.uniform(0.2, 1.0, (8, 10))), 1.0)
+    springs = grid_springs(Sheet(vertices, stiffness=rng.uniform(0.2, 1.0, (8, 10))), SpringSettings(1.0))
     points, matrix = vertices.reshape(-1, 3), np.zeros((99, 3, 99, 3))
     for a, b, _, k in zip(*springs.pairs(), strict=True):
         axis = (points[a] - points[b]) / np.linalg.norm(points[a] - points[b])
@@ -31,7 +32,7 @@ def test_stiffest_mode_is_the_largest_eigenvalue_of_the_dense_matrix() -> None:
 
 def test_stiffest_mode_of_a_large_square_grid_is_eight_k_over_m() -> None:
     vertices = flat_grid((40, 40), (39.0, 39.0))
-    physics = system(chord_springs(Sheet(vertices), 3.0), beta=0, mass=0.5, gravity=0, drag=0)
+    physics = system(grid_springs(Sheet(vertices), SpringSettings(3.0)), beta=0, mass=0.5, gravity=0, drag=0)
     assert stiffest_mode(np.ascontiguousarray(vertices.reshape(-1, 3).T), physics) == pytest.approx(8 * 6, rel=0.01)
 
 
@@ -55,7 +56,7 @@ def test_undamped_rk4_is_stable_to_two_root_two() -> None:
 def test_measured_limit_is_the_predicted_one(integrator: str, ratio: float) -> None:
     rest = flat_grid((8, 8))
     x = np.ascontiguousarray(rest.reshape(-1, 3).T)
-    still = system(chord_springs(Sheet(rest), 1.0), beta=0, mass=1.0, gravity=0.0, drag=0.02)
+    still = system(grid_springs(Sheet(rest), SpringSettings(1.0)), beta=0, mass=1.0, gravity=0.0, drag=0.02)
     lam = stiffest_mode(x, still)
     physics = still._replace(beta=2 * ratio / np.sqrt(lam))
     limit = largest_stable_step(INTEGRATORS[integrator], lam, physics.beta, 0.02)
