@@ -62,10 +62,12 @@ class Surfaces(Study):
             Column("relief_mm", "relief [mm]", 1),
         ),
         (Plot("flat_rigid_mean_mm", "flat_rigid_mean_mm", "mean distance from the truth, rigidly aligned [mm]"),),
-        times=Times(
-            "Time",
-            "Wall-clock seconds of the flattening alone, median of the trials, after one of a small sheet.",
-            (Column("seconds_flatten", "flatten [s]", 3),),
+        times=(
+            Times(
+                "Time",
+                "Wall-clock seconds of the flattening alone, median of the trials, after one of a small sheet.",
+                (Column("seconds_flatten", "flatten [s]", 3),),
+            ),
         ),
     )
 
