@@ -105,6 +105,29 @@ def page_grid(page_size_mm: tuple[float, float], spacing_mm: float = SPACING_MM)
     return np.stack(np.meshgrid(u, v), axis=-1)
 
 
+def page_grid_of(shape: tuple[int, int], page_size_mm: tuple[float, float]) -> Floats:
+    """Page coordinates of a regular grid of given size that spans the page.
+
+    Parameters
+    ----------
+    shape : (rows, columns)
+        Vertices along v and along u, at least 2.
+    page_size_mm : (width, height)
+        Page [mm].
+
+    Returns
+    -------
+    (rows, columns, 2) array
+        (u, v) [mm].
+    """
+    require(min(shape) >= 2, "shape", "be (rows, columns), each at least 2", shape)
+    width, height = page_size_mm
+    sound = bool(np.isfinite(page_size_mm).all()) and min(page_size_mm) > 0
+    require(sound, "page_size_mm", "be positive and finite", page_size_mm)
+    u, v = np.linspace(0.0, width, shape[1]), np.linspace(0.0, height, shape[0])
+    return np.stack(np.meshgrid(u, v), axis=-1)
+
+
 def to_world(flat: Floats, page_size_mm: tuple[float, float]) -> Floats:
     """Lay page coordinates (..., 2) flat on the bed: (..., 3), X = u - W / 2, Y = H / 2 - v, Z = 0 [mm]."""
     width, height = page_size_mm
