@@ -1,7 +1,7 @@
-"""Bent pages of one closed form each, sampled at any grid: cylinder, cone, parallel folds; every length is the page's.
+"""Bent pages of one closed form each, sampled at any grid: cylinder, cone, parallel folds; lengths stay the page's.
 
-A surface is a map of the flat page that a single angle bends, its *severity*: zero leaves the page flat. The severity is
-solved for the wanted slope, then the sheet is levelled and laid on the bed.
+A surface is a map of the flat page that a single angle bends, its *severity*: zero leaves the page flat. The severity
+is solved for the wanted slope, then the sheet is levelled and laid on the bed.
 """
 
 from __future__ import annotations
@@ -29,12 +29,11 @@ _ATTEMPTS = 50
 
 
 def projected_cells(vertices: Floats) -> Floats:
-    """Signed area of every cell of a grid (h, w, 3) as seen from above: (h - 1, w - 1) [mm^2], positive if facing up."""
+    """Signed area of each cell of a grid (h, w, 3) as seen from above: (h - 1, w - 1) [mm^2], positive if facing up."""
     x, y = vertices[..., 0], vertices[..., 1]
-    twice = (y[:-1, 1:] - y[1:, :-1]) * (x[:-1, :-1] - x[1:, 1:]) - (x[:-1, 1:] - x[1:, :-1]) * (
-        y[:-1, :-1] - y[1:, 1:]
-    )
-    return -np.asarray(twice) / 2
+    rising = (x[:-1, 1:] - x[1:, :-1]) * (y[:-1, :-1] - y[1:, 1:])
+    falling = (y[:-1, 1:] - y[1:, :-1]) * (x[:-1, :-1] - x[1:, 1:])
+    return np.asarray(rising - falling) / 2
 
 
 def least_cell(vertices: Floats) -> float:
@@ -208,10 +207,10 @@ def _level(surface: Surface, severity: float, probe: Floats, points: Floats) -> 
     target = probe.reshape(-1, 3)
     bent = surface(target, severity)
     R = best_rotation(bent - bent.mean(axis=0), target)
-    return np.einsum("ij,kj->ik", surface(points.reshape(-1, 3), severity), R).reshape(points.shape)
+    return np.asarray(np.einsum("ij,kj->ik", surface(points.reshape(-1, 3), severity), R).reshape(points.shape))
 
 
 def laid(vertices: Floats) -> Floats:
     """Lay a sheet (h, w, 3) on the bed with its bounding box centred over the world's origin [mm]."""
     low, high = vertices.min(axis=(0, 1)), vertices.max(axis=(0, 1))
-    return vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
+    return np.asarray(vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))

@@ -20,7 +20,7 @@ from data_synth.developables import cone, cylinder, folds, least_cell
 from data_synth.folds import crumpled
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet
 from deskew.errors import DeskewError, require, require_whole
-from deskew.io import Mesh, grid_faces, write_bytes
+from deskew.io import grid_faces, write_bytes
 from deskew.types import Floats
 
 Shape = tuple[int, int]
@@ -125,7 +125,7 @@ def generate(
     """
     require(kind in KINDS, "kind", f"be one of {', '.join(KINDS)}", kind)
     require_whole("seed", seed, 0, 2**63 - 1)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([seed, *kind.encode()])  # kinds of one seed have nothing in common
     draw, (gentle, steep) = KINDS[kind]
     # Both are drawn even when given, so that a seed's surface is the same shape of bends at any grid and severity.
     rows, slope = int(rng.integers(180, 241)), float(rng.uniform(gentle, steep))
@@ -147,16 +147,12 @@ def write_surface(sheet: TrueSheet, path: Path, comments: Sequence[str] = ()) ->
         If the file system refuses.
     """
     rows, columns = sheet.vertices.shape[:2]
-    mesh = Mesh(sheet.vertices.reshape(-1, 3), grid_faces(rows, columns), sheet.flat.reshape(-1, 2))
-    write_bytes("".join(f"# {line}\n" for line in comments).encode() + _obj(mesh), path)
-
-
-def _obj(mesh: Mesh) -> bytes:
     text = io.BytesIO()
-    np.savetxt(text, mesh.vertices, fmt="v %.9f %.9f %.9f")
-    np.savetxt(text, mesh.texture, fmt="vt %.9f %.9f")
-    np.savetxt(text, np.repeat(mesh.faces + 1, 2, axis=1), fmt="f %d/%d %d/%d %d/%d")
-    return text.getvalue()
+    text.write("".join(f"# {line}\n" for line in comments).encode())
+    np.savetxt(text, sheet.vertices.reshape(-1, 3), fmt="v %.9f %.9f %.9f")
+    np.savetxt(text, sheet.flat.reshape(-1, 2), fmt="vt %.9f %.9f")
+    np.savetxt(text, np.repeat(grid_faces(rows, columns) + 1, 2, axis=1), fmt="f %d/%d %d/%d %d/%d")
+    write_bytes(text.getvalue(), path)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
