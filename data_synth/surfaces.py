@@ -18,8 +18,9 @@ import numpy as np
 
 from data_synth.developables import cone, cylinder, folds, least_cell
 from data_synth.folds import crumpled
+from data_synth.physical import physical
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet
-from deskew.errors import DeskewError, require, require_whole
+from deskew.errors import DeskewError, InputError, require, require_whole
 from deskew.io import grid_faces, write_bytes
 from deskew.types import Floats
 
@@ -43,6 +44,7 @@ KINDS: dict[str, tuple[Kind, tuple[float, float]]] = {
     "cone": (cone, (25.0, 45.0)),
     "folds": (folds, (20.0, 40.0)),
     "mirror": (mirror, (15.0, 25.0)),
+    "physical": (physical, (12.0, 21.0)),
 }
 """Each kind's function and the range that its 90th percentile of slope is drawn from [deg]."""
 
@@ -182,7 +184,10 @@ def _write_all(options: argparse.Namespace) -> None:
     both = (options.rows is None) == (options.columns is None)
     require(both, "rows", "be given together with `columns`", "one of them")
     shape = None if options.rows is None else (options.rows, options.columns)
-    options.folder.mkdir(parents=True, exist_ok=True)
+    try:
+        options.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"`folder` must be a folder or a place for one, got {error.strerror or error}.") from error
     for kind in kinds:
         for seed in range(options.seed, options.seed + options.count):
             sheet = generate(kind, seed, shape, slope_p90_deg=options.slope_p90_deg)
