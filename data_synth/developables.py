@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from data_synth.cylinder import Bend, roll
 from data_synth.folds import best_rotation
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, page_grid_of, slopes_deg, to_world
+from data_synth.sheets import LEAST_CELL, PAGE_SIZE_MM, TrueSheet, laid, least_cell, page_grid_of, slopes_deg, to_world
 from deskew.errors import StepError, require
 from deskew.types import Floats
 
@@ -24,22 +24,7 @@ SHAPE = (200, 258)
 """Default grid (rows, columns)."""
 
 _PROBE = (109, 141)  # where the slope is measured, so that the surface does not depend on the grid asked for
-_LEAST_CELL = 0.3  # of the median: a smaller projected cell belongs to a near-vertical wall or an overhang
 _ATTEMPTS = 50
-
-
-def projected_cells(vertices: Floats) -> Floats:
-    """Signed area of each cell of a grid (h, w, 3) as seen from above: (h - 1, w - 1) [mm^2], positive if facing up."""
-    x, y = vertices[..., 0], vertices[..., 1]
-    rising = (x[:-1, 1:] - x[1:, :-1]) * (y[:-1, :-1] - y[1:, 1:])
-    falling = (y[:-1, 1:] - y[1:, :-1]) * (x[:-1, :-1] - x[1:, 1:])
-    return np.asarray(rising - falling) / 2
-
-
-def least_cell(vertices: Floats) -> float:
-    """Smallest projected cell of a grid (h, w, 3) over their median; negative where the sheet hangs over itself."""
-    area = projected_cells(vertices)
-    return float(area.min() / np.median(area))
 
 
 def cylinder(
@@ -197,7 +182,7 @@ def _placed(
             raise StepError(f"slope_p90_deg: {slope_p90_deg} is out of this surface's reach; lower `slope_p90_deg`.")
     severity = float(brentq(excess, low, high, xtol=1e-5))
     vertices = _level(surface, severity, probe, to_world(flat, page_size_mm))
-    if least_cell(vertices) < _LEAST_CELL:
+    if least_cell(vertices) < LEAST_CELL:
         raise StepError("surface: it has walls or hangs over itself; lower `slope_p90_deg`.")
     return TrueSheet(laid(vertices), flat)
 
@@ -208,9 +193,3 @@ def _level(surface: Surface, severity: float, probe: Floats, points: Floats) -> 
     bent = surface(target, severity)
     R = best_rotation(bent - bent.mean(axis=0), target)
     return np.asarray(np.einsum("ij,kj->ik", surface(points.reshape(-1, 3), severity), R).reshape(points.shape))
-
-
-def laid(vertices: Floats) -> Floats:
-    """Lay a sheet (h, w, 3) on the bed with its bounding box centred over the world's origin [mm]."""
-    low, high = vertices.min(axis=(0, 1)), vertices.max(axis=(0, 1))
-    return np.asarray(vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))

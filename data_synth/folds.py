@@ -14,7 +14,7 @@ from numba import njit
 from scipy.optimize import brentq
 
 from data_synth.cylinder import Bend, roll
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, page_grid, page_grid_of, slopes_deg, to_world
+from data_synth.sheets import LEAST_CELL, PAGE_SIZE_MM, TrueSheet, page_grid, page_grid_of, slopes_deg, to_world
 from deskew.errors import StepError, require
 from deskew.types import Floats
 
@@ -219,4 +219,4 @@ def _acceptable(vertices: Floats, view: View) -> bool:
         return False
     # Twice the projected area of each cell by its diagonals; negative where the cell is seen from behind.
     area = (x[:-1, 1:] - x[1:, :-1]) * (y[:-1, :-1] - y[1:, 1:]) - (y[:-1, 1:] - y[1:, :-1]) * (x[:-1, :-1] - x[1:, 1:])
-    return float(area.min()) >= 0.3 * float(np.median(area))
+    return float(area.min()) >= LEAST_CELL * float(np.median(area))

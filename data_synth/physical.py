@@ -13,17 +13,16 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 from threadpoolctl import threadpool_limits
 
-from data_synth.developables import SHAPE, laid, least_cell
+from data_synth.developables import SHAPE
 from data_synth.folds import best_rotation
 from data_synth.plate import Plate, unbent
 from data_synth.relaxation import relax, relax_plastically
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, page_grid_of, slopes_deg, to_world
+from data_synth.sheets import LEAST_CELL, PAGE_SIZE_MM, TrueSheet, laid, least_cell, page_grid_of, slopes_deg, to_world
 from deskew.errors import StepError, require, require_positive, require_whole
 from deskew.types import Floats
 
 _LEVELS = ((61, 79), (121, 156))  # (short side, long side); the grid asked for comes last
 _ATTEMPTS = 5
-_LEAST_CELL = 0.3  # of the median projected cell, as for the other kinds
 _LEAST_THICKNESS = 0.06  # of the spacing: a ridge narrower than a cell would cling to the grid
 _SPRING_BACK = 0.85  # slope that is left when the sheet is let go, over the slope under load
 
@@ -117,7 +116,7 @@ def physical(
         with threadpool_limits(1, user_api="blas"):  # the sums' order, and so the bytes, depend on the threads
             x = _crumpled(rng, last, sizes, slope_p90_deg, paper or Paper())
         vertices = _levelled(np.swapaxes(x, 0, 1) if turned else x, page_size_mm, turned)
-        if least_cell(vertices) >= _LEAST_CELL:
+        if least_cell(vertices) >= LEAST_CELL:
             return TrueSheet(laid(vertices), page_grid_of(shape, page_size_mm))
     raise StepError(f"physical: {_ATTEMPTS} sheets had walls; lower `slope_p90_deg`.")
 

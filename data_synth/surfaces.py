@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from data_synth.developables import cone, cylinder, folds, least_cell
+from data_synth.developables import cone, cylinder, folds
 from data_synth.folds import crumpled
 from data_synth.physical import physical
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet
+from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, least_cell
 from deskew.errors import DeskewError, InputError, require, require_whole
 from deskew.io import grid_faces, write_bytes
 from deskew.types import Floats

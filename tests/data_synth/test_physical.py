@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from data_synth.developables import least_cell
 from data_synth.physical import Paper, physical
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet
+from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, least_cell
 from data_synth.surfaces import edge_strain
 from deskew.errors import InputError
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -120,7 +121,7 @@ def test_relaxing_never_raises_the_energy_and_a_crease_stays() -> None:
     for _ in range(6):
         x = relax(x, plate, 1)
         energies.append(energy(x, plate))
-    assert all(after < before * 1.001 for before, after in zip(energies, energies[1:], strict=False))
+    assert all(after < before * 1.001 for before, after in pairwise(energies))
     assert energies[-1] < 0.2 * energies[0]
     x, plate = relax_plastically(x, plate, 0.01, 3, 5)
     left = relax(x, replace(plate, pull=np.zeros(shape)), 20)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from data_synth import surfaces
-from data_synth.developables import least_cell, projected_cells
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet
+from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, least_cell, projected_cells
 from deskew.errors import InputError
 from deskew.io import grid_faces, read_mesh
 from deskew.types import Floats
