@@ -16,6 +16,7 @@ from omegaconf import MISSING
 from deskew.errors import InputError, require
 
 BUDGETS = ("smoke", "paper", "full")
+SURFACE_KINDS = ("cylinder", "cone", "folds", "mirror", "physical")
 
 
 def setting(default: Any, allowed: str, holds: Callable[[Any], bool]) -> Any:
@@ -199,6 +200,7 @@ class SurfacesSettings(Checked):
     """The flattening of meshes that store their flat sheet.
 
     `paths`: meshes whose texture coordinates are the true flat places [mm], one a trial; none for generated ones.
+    `kinds`: of the generated ones, see `data_synth.surfaces`; a physical one takes minutes.
     `noise_mm`: standard deviation of the noise that is added to their z.
     """
 
@@ -207,6 +209,11 @@ class SurfacesSettings(Checked):
         [],
         "be a list of OBJ or PLY files, one a trial",
         lambda value: all(str(path).lower().endswith((".obj", ".ply")) for path in value),
+    )
+    kinds: list[str] = setting(
+        ["cylinder", "cone", "folds", "mirror"],
+        f"be a list of different ones of {', '.join(SURFACE_KINDS)}",
+        lambda value: len(set(value)) == len(value) > 0 and set(value) <= set(SURFACE_KINDS),
     )
     noise_mm: float = number(0.0, 0.0, 10.0, "mm")
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from importlib import import_module
 from statistics import median
-from typing import Any
 
 import numpy as np
 
+from data_synth import surfaces
 from deskew import flattening
 from deskew.io import sheet_mesh
 from deskew.types import Array, Floats, Sheet
@@ -71,8 +70,7 @@ def time_flattening(record: Recorder, rng: np.random.Generator, n: int) -> None:
 
 def _grid(size: int, seed: int) -> Sheet:
     """One and the same crumpled square, sampled with so many vertices a side."""
-    draw: Any = import_module("data_synth.surfaces").mirror
-    sheet = draw(np.random.default_rng(seed), (size, size), (_SIDE_MM, _SIDE_MM), _SLOPE_P90_DEG)
+    sheet = surfaces.mirror(np.random.default_rng(seed), (size, size), (_SIDE_MM, _SIDE_MM), _SLOPE_P90_DEG)
     return Sheet(sheet.vertices)
 
 

@@ -50,8 +50,9 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
     settings["method"] = config.methods
     for key, path in inputs.items():
         settings[f"sha256 of {key}"] = content_digest(sorted(path.rglob("*")) if path.is_dir() else [path], path)
-    for group, path_key in (("real_boards", "path"), ("sheet", "paths"), ("surfaces", "paths")):
-        settings.get(group, {}).pop(path_key, None)
+    # The kinds of surfaces, as what is ablated, stand in the trial's own key.
+    for group, key in (("real_boards", "path"), ("sheet", "paths"), ("surfaces", "paths"), ("surfaces", "kinds")):
+        settings.get(group, {}).pop(key, None)
     return settings
 
 

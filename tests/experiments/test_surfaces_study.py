@@ -5,19 +5,17 @@ from __future__ import annotations
 import csv
 import importlib
 import json
-import sys
 from collections import defaultdict
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from data_synth import TrueSheet
+from data_synth import TrueSheet, surfaces
 from deskew.io import Mesh, grid_faces, write_mesh
 from experiments.program import main
-from experiments.settings import SurfacesSettings
+from experiments.settings import SURFACE_KINDS, SurfacesSettings
 from experiments.trials import Row, TrialKey
 
 METHODS = ("unroll", "project", "fold", "mirror")
@@ -139,15 +137,18 @@ def test_without_files_every_kind_is_generated_in_each_trial(here: Path, monkeyp
         asked.append((kind, seed))
         return TrueSheet(*cylinder())
 
-    stand_in = SimpleNamespace(KINDS={"tube": None, "wave": None}, generate=generate)
-    monkeypatch.setitem(sys.modules, "data_synth.surfaces", stand_in)  # type: ignore[arg-type]
-    assert run("trials=2", methods=("unroll",)) == 0
-    wanted = {
-        (f"flattened/{kind}", method, i) for kind in ("tube", "wave") for method in ("-", "unroll") for i in (0, 1)
-    }
-    assert set(read()) == wanted
-    assert sorted(kind for kind, _ in asked) == ["tube", "tube", "wave", "wave"]
+    monkeypatch.setattr(surfaces, "generate", generate)
+    assert run("surfaces.kinds=[cone,mirror]", "trials=2", methods=("unroll",)) == 0
+    conditions = [f"flattened/{kind}" for kind in ("cone", "mirror")]
+    assert set(read()) == {(c, method, i) for c in conditions for method in ("-", "unroll") for i in (0, 1)}
+    assert sorted(kind for kind, _ in asked) == ["cone", "cone", "mirror", "mirror"]
     assert len({seed for _, seed in asked}) == 2
+    assert run("trials=1", methods=("unroll",)) == 0
+    assert [kind for kind, _ in asked[4:]] == ["cylinder", "folds"]  # the others are kept
+
+
+def test_the_kinds_are_those_that_can_be_generated() -> None:
+    assert set(SURFACE_KINDS) == set(surfaces.KINDS)
 
 
 @pytest.mark.parametrize(
@@ -156,6 +157,7 @@ def test_without_files_every_kind_is_generated_in_each_trial(here: Path, monkeyp
         ("surfaces.paths=[gone.obj]", "`surfaces.paths` must name files, got gone.obj, where there is none."),
         ("surfaces.paths=[a.stl]", "`surfaces.paths` must be a list of OBJ or PLY files, one a trial, got ['a.stl']."),
         ("surfaces.noise_mm=-1", "`surfaces.noise_mm` must lie in [0, 10] mm, got -1.0."),
+        ("surfaces.kinds=[ball]", "`surfaces.kinds` must be a list of different ones of cylinder, cone"),
         ("method=iron", "`method` must be one of"),
     ],
 )
@@ -170,5 +172,5 @@ def test_what_it_cannot_do_is_refused_before_anything_is_written(
 
 
 def test_defaults_are_of_no_noise_and_no_files() -> None:
-    assert SurfacesSettings() == SurfacesSettings([], 0.0)
+    assert (SurfacesSettings().paths, SurfacesSettings().noise_mm) == ([], 0.0)
     assert Row.of(TrialKey("surfaces"), "flattened/a", "-", "noise_estimated_mm", 0.3).unit == "mm"
