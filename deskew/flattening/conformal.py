@@ -81,6 +81,4 @@ def covered_area(x: Floats, faces: Indices) -> float:
 def signed_areas(x: Floats, faces: Indices) -> Floats:
     """Area of each face (F,) in the plane [mm^2], negative where it is turned over."""
     a, b, c = x[faces[:, 0]], x[faces[:, 1]], x[faces[:, 2]]
-    return np.asarray(
-        0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
-    )
+    return np.asarray(0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])))

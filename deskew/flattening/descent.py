@@ -12,29 +12,59 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csc_array, kron
 
-from deskew.flattening.anderson import accelerate
+from deskew.flattening.anderson import Iterated, accelerate
 from deskew.flattening.energies import Energy
 from deskew.flattening.laplace import Laplacian, factor
 from deskew.types import Floats
 
 _RIDGE = 1e-9  # of the Laplacian's diagonal: neither moving nor turning the whole sheet costs anything
 _SHORTEST_STEP = 1e-6
+_PATIENCE = 150  # local and global steps after which Newton's method is the cheaper one
 
 
-def local_global(
-    model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int
+def minimise(
+    model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int, *, uneven: bool = False
 ) -> tuple[Floats, int]:
-    """Find the edges' best vectors, then the best places for them, until no coordinate changes by more than `step_mm`.
+    """Go down an energy until no coordinate changes by more than `step_mm` in a step.
+
+    Parameters
+    ----------
+    model : Energy
+        What to minimise.
+    system : Laplacian
+        Of the model's edges and weights.
+    start : (V, 2) array
+        [mm].
+    step_mm : float
+        Largest change of a coordinate that counts as none [mm].
+    max_iterations : int
+        Steps after which to give up.
+    uneven : bool
+        Whether the stiffness varies so strongly that only Newton's method will do.
 
     Returns
     -------
     x : (V, 2) array
         [mm].
     n_iterations : int
-        Solves of the Laplace system.
+        Steps taken.
     """
-    found = accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, max_iterations)
-    return found.x, found.n_iterations
+    n = 0
+    if not uneven:
+        found = local_global(model, system, start, step_mm, min(max_iterations, _PATIENCE))
+        start, n = found.x, found.n_iterations
+        if found.converged or n == max_iterations:
+            return start, n
+    x, more = newton(model, system, start, step_mm, max_iterations - n)
+    return x, n + more
+
+
+def local_global(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> Iterated:
+    """Find the edges' best vectors, then the best places for them, until no coordinate changes by more than `step_mm`.
+
+    The system is factored once; every step solves it once.
+    """
+    return accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, max_iterations)
 
 
 def newton(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> tuple[Floats, int]:

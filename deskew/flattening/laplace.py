@@ -14,9 +14,7 @@ from deskew.types import Floats
 
 def factor(matrix: Any) -> SuperLU:
     """Factor a symmetric positive definite sparse matrix without pivoting, in an order of least degree."""
-    return splu(
-        csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    return splu(csc_array(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def laplacian(ends: Indices, weights: Floats, n_vertices: int) -> csc_array:

@@ -14,13 +14,15 @@ Peng et al., Anderson acceleration for geometry optimization and physics simulat
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from deskew.errors import StepError, require, require_positive, require_whole
 from deskew.flattening.conformal import lscm, signed_areas, tutte
-from deskew.flattening.descent import local_global, newton
-from deskew.flattening.energies import ENERGIES, Energy
+from deskew.flattening.descent import minimise
+from deskew.flattening.energies import ENERGIES, BuildEnergy, Energy
 from deskew.flattening.intrinsic import Triangles, bearings, triangles
 from deskew.flattening.laplace import Laplacian
 from deskew.flattening.topology import Disc, Edges, Indices, disc_of, edges_of
@@ -30,15 +32,17 @@ from deskew.types.arrays import require_numbers
 
 _UNEVEN = 3.0  # ratio of stiffness beyond which Newton's method is used
 _UPSIDE_DOWN = 0.25  # a rolled sheet's projected area is never below -0.22 of its own, an overturned page's is near -1
-REMEDY = "smooth the surface or its noise, or cut it where it cannot lie flat"
+_FEW = 0.01  # share of faces turned over that is a local matter
+_STIFFEN, _ROUNDS = 5.0, 6
+_REMEDY = "smooth the surface or its noise, or cut it where it cannot lie flat"
 
 
 def flatten_mesh(
     sheet: Sheet,
     *,
-    energy: str = "springs",
+    energy: str = "arap",
     rest: Floats | None = None,
-    tolerance: float = 5e-7,
+    tolerance: float = 2e-7,
     max_iterations: int = 500,
 ) -> Flattened:
     """Flatten a triangle mesh onto Z = 0, without folding it.
@@ -49,7 +53,9 @@ def flatten_mesh(
         Triangle mesh [mm]: one orientable piece with a border; holes and overhangs are welcome. Its stiffness, if
         any, is one value a face [kg/s^2]; only ratios matter.
     energy : str
-        "springs" or "arap" (as rigid as possible).
+        "arap" (as rigid as possible) or "springs". On clean isometric meshes both err alike; springs do not resist
+        being turned over, so that on sharp folds and irregular triangles they leave folded faces where the other
+        leaves none, and take longer.
     rest : (E,) array or None
         Length that each edge of `edges_of(sheet.faces)` has on the flat sheet, >= 0 [mm]; None for its length now.
     tolerance : float
@@ -63,7 +69,8 @@ def flatten_mesh(
         Vertices as many as and in the order of the sheet's, centred on its centre in x and y and turned to fit it
         best, with z = 0. A mesh that mostly faces up or down is seen from above, never mirrored; any other one (a
         scroll) lies with its faces counter-clockwise. A vertex without a face lies at its nearest neighbour's place.
-        Counters: `iterations`, `flips`, `energy` [uJ], `healed_vertices`, `healed_faces`.
+        Counters: `iterations`, `flips`, `energy` (of a mean stiffness of 1 kg/s^2) [uJ], `healed_vertices`,
+        `healed_faces`, and `stiffened_faces`, which were turned over at first and made stiffer to lie right.
 
     Raises
     ------
@@ -78,42 +85,98 @@ def flatten_mesh(
     disc = disc_of(sheet)
     lengths = _lengths(disc) if rest is None else _given(rest, sheet, disc)
     faces, edges = _upright(disc)
-    shapes = triangles(lengths, edges)
+    plate = _Plate(faces, edges, triangles(lengths, edges), len(disc.vertices))
     stiffness = np.ones(len(faces)) if sheet.stiffness is None else np.asarray(sheet.stiffness, float)[disc.kept]
-    model = ENERGIES[energy](shapes, faces, edges, stiffness / stiffness.mean())
-    system = Laplacian(edges.ends, model.weights, len(disc.vertices))
-    uneven = float(stiffness.max()) > _UNEVEN * float(stiffness.min())
-    solve = newton if uneven else local_global
-    step = tolerance * float(np.ptp(disc.vertices, axis=0).max())
-    best: tuple[int, Floats] | None = None
-    iterations = 0
-    for start in _starts(shapes, faces, edges, model, system):
-        x, n = solve(model, system, start, step, max_iterations)
-        iterations += n
-        flips = _flips(x, faces, shapes)
-        if np.isfinite(x).all() and (best is None or flips < best[0]):
-            best = (flips, x)
-        if best is not None and best[0] == 0:
-            break
-    if best is None:
-        raise StepError("Flattening the mesh found no finite places for its vertices; remove its needle-like faces.")
-    flips, x = best
+    stiffness = stiffness / stiffness.mean()
+    step_mm = tolerance * float(np.ptp(disc.vertices, axis=0).max())
+    found = _solve(plate, stiffness, ENERGIES[energy], step_mm, max_iterations)
     placed = np.zeros((len(disc.vertices), 3))
-    placed[:, :2] = _aligned(x, disc.vertices[:, :2])
-    counters = {"iterations": float(iterations), "flips": float(flips), "energy": model.value(x), **disc.counts}
-    counters["healed_faces"] += shapes.n_mended
-    status, remedy = (Status.FOLDED, f"{flips} faces are turned over: {REMEDY}") if flips else (Status.AT_REST, "")
+    placed[:, :2] = _aligned(found.x, disc.vertices[:, :2])
+    counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": found.energy}
+    counters |= disc.counts
+    counters["healed_faces"] += plate.shapes.n_mended
+    counters["stiffened_faces"] = float(found.stiffened)
+    status, remedy = Status.AT_REST, ""
+    if found.flips:
+        status, remedy = Status.FOLDED, f"{found.flips} faces are turned over: {_REMEDY}"
     return Flattened(placed[disc.representative], status, remedy, counters)
 
 
-def _starts(
-    shapes: Triangles, faces: Indices, edges: Edges, model: Energy, system: Laplacian
-) -> Iterator[Floats]:
-    """Ever safer, ever dearer starts."""
-    bearing = bearings(shapes, faces, edges, int(faces.max()) + 1)
-    yield unfold(edges.ends, model.weights, shapes.lengths, bearing, system)
-    yield lscm(shapes, faces, edges)
-    yield tutte(shapes, faces, edges)
+class _Plate(NamedTuple):
+    """A disc as the solver sees it: lengths, no places."""
+
+    faces: Indices
+    edges: Edges
+    shapes: Triangles
+    n_vertices: int
+
+    def starts(self, model: Energy, system: Laplacian) -> Iterator[Floats]:
+        """Ever safer, ever dearer starts, (V, 2) each [mm]."""
+        bearing = bearings(self.shapes, self.faces, self.edges, self.n_vertices)
+        yield unfold(self.edges.ends, model.weights, self.shapes.lengths, bearing, system)
+        yield lscm(self.shapes, self.faces, self.edges)
+        yield tutte(self.shapes, self.faces, self.edges)
+
+    def turned_over(self, x: Floats) -> npt.NDArray[np.bool_]:
+        """Faces that lost their area or are turned over; those that never had any to speak of do not count."""
+        areas = self.shapes.areas
+        return np.asarray((signed_areas(x, self.faces) <= 1e-6 * areas) & (areas > 1e-6 * areas.mean()))
+
+
+class _Found(NamedTuple):
+    """Where a solve came to."""
+
+    x: Floats
+    iterations: int
+    flips: int
+    energy: float
+    stiffened: int
+
+
+def _solve(plate: _Plate, stiffness: Floats, build: BuildEnergy, step_mm: float, max_iterations: int) -> _Found:
+    """Minimise from one start after the other until few faces are turned over, then stiffen those few."""
+    model = build(plate.shapes, plate.faces, plate.edges, stiffness)
+    system = Laplacian(plate.edges.ends, model.weights, plate.n_vertices)
+    uneven = float(stiffness.max()) > _UNEVEN * float(stiffness.min())
+    best: _Found | None = None
+    iterations = 0
+    for start in plate.starts(model, system):
+        x, n = minimise(model, system, start, step_mm, max_iterations, uneven=uneven)
+        iterations += n
+        flips = int(plate.turned_over(x).sum())
+        if np.isfinite(x).all() and (best is None or flips < best.flips):
+            best = _Found(x, iterations, flips, model.value(x), 0)
+        # A wrong start turns whole regions over, a hard surface here and there a face.
+        if best is not None and best.flips <= _FEW * len(plate.faces):
+            break
+    if best is None:
+        raise StepError("Flattening the mesh found no finite places for its vertices; remove its needle-like faces.")
+    return _stiffened(plate, stiffness, build, best, step_mm, max_iterations) if best.flips else best
+
+
+def _stiffened(
+    plate: _Plate, stiffness: Floats, build: BuildEnergy, best: _Found, step_mm: float, max_iterations: int
+) -> _Found:
+    """Stiffen the faces that are turned over, and those around them, again and again; keep what turns the fewest."""
+    found, touched = best, np.zeros(len(plate.faces), dtype=np.bool_)
+    for _ in range(_ROUNDS):
+        near = np.zeros(plate.n_vertices, dtype=np.bool_)
+        near[plate.faces[plate.turned_over(found.x)]] = True
+        around = near[plate.faces].any(axis=1)
+        touched |= around
+        stiffness = np.where(around, _STIFFEN * stiffness, stiffness)
+        model = build(plate.shapes, plate.faces, plate.edges, stiffness)
+        system = Laplacian(plate.edges.ends, model.weights, plate.n_vertices)
+        x, n = minimise(model, system, found.x, step_mm, max_iterations)
+        if not np.isfinite(x).all():
+            break
+        flips = int(plate.turned_over(x).sum())
+        found = _Found(x, found.iterations + n, flips, model.value(x), int(touched.sum()))
+        if flips < best.flips:
+            best = found
+        if not flips:
+            break
+    return best._replace(iterations=found.iterations)
 
 
 def _lengths(disc: Disc) -> Floats:
@@ -150,11 +213,6 @@ def _upright(disc: Disc) -> tuple[Indices, Edges]:
         return disc.faces, disc.edges
     faces = np.ascontiguousarray(disc.faces[:, ::-1])
     return faces, edges_of(faces)
-
-
-def _flips(x: Floats, faces: Indices, shapes: Triangles) -> int:
-    """Number of faces that are turned over; those that never had an area to speak of are not counted."""
-    return int((signed_areas(x, faces) < -1e-6 * float(shapes.areas.mean())).sum())
 
 
 def _aligned(x: Floats, onto: Floats) -> Floats:
