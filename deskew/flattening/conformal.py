@@ -24,7 +24,7 @@ def lscm(shapes: Triangles, faces: Indices, edges: Edges) -> Floats:
     farthest apart along the border are held; faces wind counter-clockwise.
     """
     ends, n = edges.ends, len(np.unique(faces))
-    cotangents = np.bincount(edges.of_face.ravel(), 0.5 * shapes.cotangents.ravel(), len(ends))
+    cotangents = np.bincount(edges.of_face.ravel(), 0.5 * shapes.cotangents.ravel(), len(ends)).astype(np.float64)
     L = laplacian(ends, cotangents, n)
     border = np.flatnonzero(edges.opposite < 0)
     a, b = faces.ravel()[border], faces.ravel()[border - border % 3 + (border + 1) % 3]
@@ -43,7 +43,7 @@ def lscm(shapes: Triangles, faces: Indices, edges: Edges) -> Floats:
     rows = system[free]
     out[free] = factor(rows[:, free]).solve(-(rows[:, fixed] @ out[fixed]))
     x = np.ascontiguousarray(out.reshape(2, n).T)
-    return x * np.sqrt(float(shapes.areas.sum()) / max(abs(covered_area(x, faces)), 1e-300))
+    return np.asarray(x * np.sqrt(float(shapes.areas.sum()) / max(abs(covered_area(x, faces)), 1e-300)))
 
 
 def tutte(shapes: Triangles, faces: Indices, edges: Edges) -> Floats:

@@ -19,6 +19,7 @@ from deskew.types import Floats
 
 _RIDGE = 1e-9  # of the Laplacian's diagonal: neither moving nor turning the whole sheet costs anything
 _SHORTEST_STEP = 1e-6
+_NEWTON_STEPS = 40  # it takes 3 to 10, or is caught among springs that buckle
 _PATIENCE = 150  # local and global steps after which Newton's method is the cheaper one
 
 
@@ -55,7 +56,7 @@ def minimise(
         start, n = found.x, found.n_iterations
         if found.converged or n == max_iterations:
             return start, n
-    x, more = newton(model, system, start, step_mm, max_iterations - n)
+    x, more = newton(model, system, start, step_mm, min(max_iterations - n, _NEWTON_STEPS))
     return x, n + more
 
 

@@ -37,7 +37,7 @@ class Energy(Protocol):
         """Right-hand side (V, 2) of the Laplace system for the best p at `x`."""
 
     def value(self, x: Floats) -> float:
-        """The energy at `x` [weight mm^2]."""
+        """Compute the energy at `x` [weight mm^2]."""
 
     def softening(self, x: Floats) -> tuple[Indices, Floats]:
         """Rank-one terms g g' that the Hessian at `x` lacks: the vertices (M, n) and g (M, n, 2) of each."""
@@ -111,7 +111,7 @@ class RigidFaces(NamedTuple):
         return float(_value_faces(x, self.faces, self.laid, self.sides))
 
     def softening(self, x: Floats) -> tuple[Indices, Floats]:
-        """A small turn of a face costs nothing: the term of its best turn, bounded where the face is compressed."""
+        """Take away what a small turn of a face seems to cost; less than all where the face is compressed."""
         terms = np.empty((len(self.faces), 3, 2))
         _soften_faces(x, self.faces, self.laid, self.sides, terms)
         return self.faces, terms
@@ -139,7 +139,8 @@ def springs(shapes: Triangles, edges: Edges, stiffness: Floats) -> Springs:
 def rigid_faces(shapes: Triangles, faces: Indices, edges: Edges, stiffness: Floats) -> RigidFaces:
     """Make every face as rigid as possible, with its stiffness (F,) > 0 [kg/s^2]."""
     sides = 0.5 * stiffness[:, None] * shapes.cotangents
-    return RigidFaces(faces, shapes.laid, sides, np.bincount(edges.of_face.ravel(), sides.ravel(), len(edges.ends)))
+    weights = np.bincount(edges.of_face.ravel(), sides.ravel(), len(edges.ends)).astype(np.float64)
+    return RigidFaces(faces, shapes.laid, sides, weights)
 
 
 BuildEnergy = Callable[[Triangles, Indices, Edges, Floats], Energy]

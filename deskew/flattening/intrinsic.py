@@ -101,9 +101,8 @@ def _angle(laid: Floats, corner: int) -> float:
     """Angle of a face at a corner [rad]."""
     a, x, y = laid[corner // 3, 0], laid[corner // 3, 1], laid[corner // 3, 2]
     at_start, at_next = np.arctan2(y, x), np.arctan2(y, a - x)
-    if corner % 3 == 0:
-        return at_start
-    return at_next if corner % 3 == 1 else np.pi - at_start - at_next
+    at_last = np.pi - at_start - at_next
+    return float(at_start if corner % 3 == 0 else (at_next if corner % 3 == 1 else at_last))
 
 
 @njit(cache=True)

@@ -33,7 +33,7 @@ from deskew.types.arrays import require_numbers
 _UNEVEN = 3.0  # ratio of stiffness beyond which Newton's method is used
 _UPSIDE_DOWN = 0.25  # a rolled sheet's projected area is never below -0.22 of its own, an overturned page's is near -1
 _FEW = 0.01  # share of faces turned over that is a local matter
-_STIFFEN, _ROUNDS = 5.0, 6
+_STIFFEN, _ROUNDS = 5.0, 4
 _REMEDY = "smooth the surface or its noise, or cut it where it cannot lie flat"
 
 
@@ -91,7 +91,7 @@ def flatten_mesh(
     step_mm = tolerance * float(np.ptp(disc.vertices, axis=0).max())
     found = _solve(plate, stiffness, ENERGIES[energy], step_mm, max_iterations)
     placed = np.zeros((len(disc.vertices), 3))
-    placed[:, :2] = _aligned(found.x, disc.vertices[:, :2])
+    placed[:, :2] = aligned(found.x, disc.vertices[:, :2])
     counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": found.energy}
     counters |= disc.counts
     counters["healed_faces"] += plate.shapes.n_mended
@@ -205,17 +205,23 @@ def _given(rest: Floats, sheet: Sheet, disc: Disc) -> Floats:
 
 
 def _upright(disc: Disc) -> tuple[Indices, Edges]:
-    """Faces that wind counter-clockwise as seen from above, if the mesh has an upper side at all."""
-    a, b, c = (disc.vertices[disc.faces[:, k]] for k in range(3))
+    """Faces as seen from above, with their edges."""
+    faces = faces_from_above(disc.vertices, disc.faces)
+    return faces, disc.edges if faces is disc.faces else edges_of(faces)
+
+
+def faces_from_above(vertices: Floats, faces: Indices) -> Indices:
+    """Turn all faces (F, 3) round if a mesh mostly faces down, so that its flat picture is the one from above.
+
+    A rolled sheet has no upper side; its faces stay as they are.
+    """
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     seen, whole = float(normals[:, 2].sum()), float(np.linalg.norm(normals, axis=1).sum())
-    if seen >= -_UPSIDE_DOWN * whole:
-        return disc.faces, disc.edges
-    faces = np.ascontiguousarray(disc.faces[:, ::-1])
-    return faces, edges_of(faces)
+    return np.ascontiguousarray(faces[:, ::-1]) if seen < -_UPSIDE_DOWN * whole else faces
 
 
-def _aligned(x: Floats, onto: Floats) -> Floats:
+def aligned(x: Floats, onto: Floats) -> Floats:
     """Turn and move points (V, 2) to fit others best, without a mirror."""
     x, centre = x - x.mean(axis=0), onto.mean(axis=0)
     target = onto - centre

@@ -238,7 +238,7 @@ def _n_apart(ends: Indices, n_vertices: int) -> int:
 
 @njit(cache=True)
 def _pair(keys: Indices, order: Indices) -> tuple[Indices, int, Indices]:
-    """Number equal keys alike, and join the half-edges that share one."""
+    """Give equal keys the same number, and join the half-edges that share one."""
     of_half = np.empty(len(keys), dtype=np.int64)
     opposite = np.full(len(keys), -1, dtype=np.int64)
     edge = -1
@@ -287,7 +287,7 @@ def _orient(faces: Indices, opposite: Indices) -> tuple[Array, bool, int]:
 
 @njit(cache=True)
 def _fans(faces: Indices, opposite: Indices, n_vertices: int) -> Indices:
-    """Number of fans of faces at each vertex of an oriented mesh."""
+    """Count the fans of faces at each vertex of an oriented mesh."""
     fans = np.zeros(n_vertices, dtype=np.int64)
     seen = np.zeros(3 * len(faces), dtype=np.bool_)
     for corner in range(3 * len(faces)):
