@@ -86,6 +86,7 @@ def flatten_mesh(
     lengths = _lengths(disc) if rest is None else _given(rest, sheet, disc)
     faces, edges = _upright(disc)
     plate = _Plate(faces, edges, triangles(lengths, edges), len(disc.vertices))
+    require(plate.shapes.n_mended < len(faces), "vertices", "span an area", "faces without area only")
     stiffness = np.ones(len(faces)) if sheet.stiffness is None else np.asarray(sheet.stiffness, float)[disc.kept]
     stiffness = stiffness / stiffness.mean()
     step_mm = tolerance * float(np.ptp(disc.vertices, axis=0).max())

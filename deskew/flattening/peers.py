@@ -63,7 +63,7 @@ PEERS = {"lscm": lscm, "arap": arap, "slim": slim}
 def as_mesh(sheet: Sheet) -> tuple[Floats, Indices]:
     """Vertices (V, 3) and faces (F, 3) of a sheet, wound as seen from above.
 
-    The quads of a grid are halved, cut ones left out; the diagonals run from each quad's upper right to its lower left vertex.
+    The quads of a grid are halved from upper right to lower left, cut ones left out.
     """
     vertices = np.ascontiguousarray(sheet.vertices.reshape(-1, 3))
     if sheet.faces is None:

@@ -143,6 +143,7 @@ def _tidy(vertices: Floats, faces: Indices, merged: Indices, size: float) -> tup
         elif not sides:
             complaint = ("have two sides", "a surface with one side (not orientable)")
         elif turned.any():
+            turned = turned if 2 * turned.sum() <= len(turned) else ~turned  # the majority is right
             corners = np.where(turned[:, None], corners[:, ::-1], corners)
             edges = edges_of(corners)
             counts["healed_faces"] += float(turned.sum())
