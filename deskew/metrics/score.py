@@ -40,7 +40,8 @@ def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bo
     -------
     dict
         `flat_{mean,max}_mm` and `flat_rigid_{mean,max}_mm` as :func:`deskew.metrics.flat_error`, over the vertices
-        that a face uses; the rest as :func:`deskew.metrics.sheet_stretch`, all signed as said above.
+        that a face uses; the rest as :func:`deskew.metrics.sheet_stretch`, all signed as said above, face by face
+        as in the truth.
 
     Raises
     ------
@@ -59,7 +60,9 @@ def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bo
     right = _turning(truth, faces, way)
     if same_axes and right is not truth:
         flat = _turning(flat, faces, way)
+    # A face that its file winds the other way than its neighbours is no fold: the truth knows which way it turns.
+    wound = np.where((signed_areas(right, faces) * way < 0)[:, None], faces[:, ::-1], faces)
     used = np.unique(faces)
     # flat_error takes page coordinates, whose v runs down.
     figures = flat_error(flat[used], right[used] * [1.0, -1.0])
-    return figures | stretch_figures(sheet.vertices, flat * [1.0, way], faces)
+    return figures | stretch_figures(sheet.vertices, flat * [1.0, way], wound)

@@ -11,8 +11,9 @@ import numpy as np
 
 from data_synth import surfaces
 from deskew import flattening
+from deskew.flattening import peers
 from deskew.io import sheet_mesh
-from deskew.types import Array, Floats, Sheet
+from deskew.types import Sheet
 from experiments.reporting import Column, Times
 from experiments.trials import Recorder, reason_of
 
@@ -28,7 +29,6 @@ MESH_METHODS = ("spring", RIVAL)
 _SIDE_MM = 216.0
 _SLOPE_P90_DEG = 20.0
 _ENOUGH_S = 4.0  # what takes longer is not repeated
-_ITERATIONS = 20
 
 TIMES = Times(
     "Flattening",
@@ -114,27 +114,8 @@ def _work(method: str, sheet: Sheet) -> Work:
     """Return what is timed; the peers take triangles, and ARAP a start that is not timed."""
     if method == "spring":
         return partial(flattening.flatten, sheet, method=method)
-    mesh = sheet_mesh(sheet)
+    mesh = sheet_mesh(sheet).sheet
     if method != RIVAL:
-        return partial(flattening.flatten, mesh.sheet, method=method)
-    return partial(_arap, mesh.vertices, mesh.faces, _lscm(mesh.vertices, mesh.faces))
-
-
-def _lscm(vertices: Floats, faces: Array) -> Floats:
-    """Return a conformal start (V, 2); the first vertex is pinned, and the one farthest from it."""
-    import igl
-
-    far = np.linalg.norm(vertices - vertices[0], axis=1)
-    pinned = np.array([0, int(far.argmax())], dtype=np.int64)
-    places = np.array([[0.0, 0.0], [float(far.max()), 0.0]])
-    return np.ascontiguousarray(igl.lscm(vertices, faces, pinned, places)[0])
-
-
-def _arap(vertices: Floats, faces: Array, start: Floats) -> Floats:
-    """Flatten as rigidly as possible, (V, 2), with one vertex pinned: without one libigl fails."""
-    import igl
-
-    data = igl.ARAPData()
-    data.max_iter = _ITERATIONS
-    igl.arap_precomputation(vertices, faces, 2, np.array([0], dtype=np.int32), data)
-    return np.asarray(igl.arap_solve(start[:1].copy(), data, start))
+        return partial(flattening.flatten, mesh, method=method)
+    vertices, faces = peers.as_mesh(mesh)
+    return partial(peers.arap_places, vertices, faces, peers.lscm_places(vertices, faces))

@@ -94,11 +94,22 @@ def test_scale_is_seen_rigidly_and_in_the_stretch_but_not_affinely() -> None:
 
 
 def test_a_vertex_pulled_across_its_neighbours_is_a_flip() -> None:
-    sheet, flat = cylinder()
+    sheet, truth = cylinder()
+    flat = truth.copy()
     flat[100] += [1.2, 0.0]
-    figures = score_flattening(sheet, flat * V_DOWN, flat)
+    figures = score_flattening(sheet, truth * V_DOWN, flat)
     assert figures["flips"] > 0
     assert figures["stretch_l2"] == np.inf
+
+
+@pytest.mark.parametrize("axes", [V_UP, V_DOWN], ids=["v up", "v down"])
+def test_faces_wound_otherwise_than_their_neighbours_are_no_folds(axes: Floats) -> None:
+    sheet, flat = cylinder()
+    assert sheet.faces is not None
+    untidy = sheet.faces.copy()
+    untidy[::7] = untidy[::7, ::-1]
+    figures = score_flattening(Sheet(sheet.vertices, untidy), flat * axes, flat)
+    assert figures == pytest.approx(score_flattening(sheet, flat * axes, flat))
 
 
 def test_vertices_that_no_face_uses_do_not_count() -> None:
