@@ -14,7 +14,7 @@ from numba import njit
 from scipy.optimize import brentq
 
 from data_synth.cylinder import Bend, roll
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, page_grid, slopes_deg, to_world
+from data_synth.sheets import LEAST_CELL, PAGE_SIZE_MM, TrueSheet, page_grid, page_grid_of, slopes_deg, to_world
 from deskew.errors import StepError, require
 from deskew.types import Floats
 
@@ -60,6 +60,7 @@ def crumpled(
     *,
     n_folds: tuple[int, int] = (5, 10),
     view: View | None = None,
+    shape: tuple[int, int] | None = None,
 ) -> TrueSheet:
     """Draw a crumpled sheet that is isometric to the page and has the wanted severity.
 
@@ -78,6 +79,8 @@ def crumpled(
         Mirror folds, both included.
     view : View
         Volume to stay in; by default that of the default rig.
+    shape : (rows, columns)
+        Grid that the surface is handed back on; by default the renderer's, 0.3 mm apart. The surface drawn is the same.
 
     Returns
     -------
@@ -102,7 +105,10 @@ def crumpled(
         flat = page_grid(page_size_mm)
         sheet = TrueSheet(_folded(recipe, severity, flat, coarse, page_size_mm, view), flat)
         if _acceptable(sheet.vertices, view) and abs(sheet.slope_p90_deg - slope_p90_deg) < _TOLERANCE_DEG:
-            return sheet
+            if shape is None:
+                return sheet
+            flat = page_grid_of(shape, page_size_mm)
+            return TrueSheet(_folded(recipe, severity, flat, coarse, page_size_mm, view), flat)
     raise StepError(f"crumpled: {_ATTEMPTS} sheets left the view or had walls; lower `slope_p90_deg` or widen `view`.")
 
 
@@ -158,7 +164,7 @@ def _folded(
     """Vertices (h, w, 3) of the placed sheet; the pose comes from the coarse grid, whatever the density of `flat`."""
     target = to_world(coarse, page_size_mm).reshape(-1, 3)
     model = _surface(recipe, severity, target)
-    R = _kabsch(model - model.mean(axis=0), target)
+    R = best_rotation(model - model.mean(axis=0), target)
     points = _surface(recipe, severity, to_world(flat, page_size_mm).reshape(-1, 3))
     points = np.einsum("ij,kj->ik", points, R)
     points[:, 2] -= points[:, 2].min()
@@ -171,8 +177,11 @@ def _folded(
     return np.asarray(points.reshape(*flat.shape[:2], 3))
 
 
-def _kabsch(source: Floats, target: Floats) -> Floats:
-    """Rotation (3, 3) that best turns centred `source` (N, 3) onto `target`; levels the sheet and squares it up."""
+def best_rotation(source: Floats, target: Floats) -> Floats:
+    """Return the rotation (3, 3) that best turns centred `source` (N, 3) onto `target` (N, 3) [mm], after Kabsch.
+
+    It levels a bent sheet and squares it up.
+    """
     U, _, Vt = np.linalg.svd(np.einsum("ni,nj->ij", source, target))
     D = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
     return np.asarray(Vt.T @ D @ U.T)
@@ -186,7 +195,7 @@ def _solve_severity(
 
     def excess(severity: float) -> float:
         model = _surface(recipe, severity, target)
-        R = _kabsch(model - model.mean(axis=0), target)
+        R = best_rotation(model - model.mean(axis=0), target)
         level = np.einsum("ij,kj->ik", model, R).reshape(*coarse.shape[:2], 3)
         return float(np.percentile(slopes_deg(level), 90)) - slope_p90_deg
 
@@ -210,4 +219,4 @@ def _acceptable(vertices: Floats, view: View) -> bool:
         return False
     # Twice the projected area of each cell by its diagonals; negative where the cell is seen from behind.
     area = (x[:-1, 1:] - x[1:, :-1]) * (y[:-1, :-1] - y[1:, 1:]) - (y[:-1, 1:] - y[1:, :-1]) * (x[:-1, :-1] - x[1:, 1:])
-    return float(area.min()) >= 0.3 * float(np.median(area))
+    return float(area.min()) >= LEAST_CELL * float(np.median(area))

@@ -1,7 +1,8 @@
 """Sheets of paper as surfaces with known page coordinates: flat, tilted, domed, and a tent that casts a shadow.
 
 World: Z = 0 is the bed, Z up. Page: u to the right, v down, [mm], with the page's centre over the world's origin.
-Crumpled sheets are in :mod:`data_synth.folds`.
+Crumpled sheets are in :mod:`data_synth.folds` and :mod:`data_synth.physical`, smooth ones in
+:mod:`data_synth.developables`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ PAGE_SIZE_MM = (279.0, 216.0)
 
 SPACING_MM = 0.3
 """Distance of the vertices: 931 x 721 on a letter page, three times finer than the 0.9 mm whose floor is 0.066 mm."""
+
+LEAST_CELL = 0.3
+"""Smallest projected cell of a height field over their median: below it are near-vertical walls and overhangs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +86,26 @@ def slopes_deg(vertices: Floats) -> Floats:
     return np.asarray(np.degrees(np.arccos(normals[..., 2] / np.linalg.norm(normals, axis=-1))))
 
 
+def projected_cells(vertices: Floats) -> Floats:
+    """Signed area of each cell of a grid (h, w, 3) as seen from above: (h - 1, w - 1) [mm^2], positive if facing up."""
+    x, y = vertices[..., 0], vertices[..., 1]
+    rising = (x[:-1, 1:] - x[1:, :-1]) * (y[:-1, :-1] - y[1:, 1:])
+    falling = (y[:-1, 1:] - y[1:, :-1]) * (x[:-1, :-1] - x[1:, 1:])
+    return np.asarray(rising - falling) / 2
+
+
+def least_cell(vertices: Floats) -> float:
+    """Smallest projected cell of a grid (h, w, 3) over their median; negative where the sheet hangs over itself."""
+    area = projected_cells(vertices)
+    return float(area.min() / np.median(area))
+
+
+def laid(vertices: Floats) -> Floats:
+    """Lay a sheet (h, w, 3) on the bed with its bounding box centred over the world's origin [mm]."""
+    low, high = vertices.min(axis=(0, 1)), vertices.max(axis=(0, 1))
+    return np.asarray(vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]))
+
+
 def page_grid(page_size_mm: tuple[float, float], spacing_mm: float = SPACING_MM) -> Floats:
     """Page coordinates of a regular grid over the page.
 
@@ -102,6 +126,29 @@ def page_grid(page_size_mm: tuple[float, float], spacing_mm: float = SPACING_MM)
     require(finite and min(page_size_mm) >= 10 * spacing_mm, "page_size_mm", "be at least ten cells", page_size_mm)
     u = np.linspace(0.0, width, round(width / spacing_mm) + 1)
     v = np.linspace(0.0, height, round(height / spacing_mm) + 1)
+    return np.stack(np.meshgrid(u, v), axis=-1)
+
+
+def page_grid_of(shape: tuple[int, int], page_size_mm: tuple[float, float]) -> Floats:
+    """Page coordinates of a regular grid of given size that spans the page.
+
+    Parameters
+    ----------
+    shape : (rows, columns)
+        Vertices along v and along u, at least 2.
+    page_size_mm : (width, height)
+        Page [mm].
+
+    Returns
+    -------
+    (rows, columns, 2) array
+        (u, v) [mm].
+    """
+    require(min(shape) >= 2, "shape", "be (rows, columns), each at least 2", shape)
+    width, height = page_size_mm
+    sound = bool(np.isfinite(page_size_mm).all()) and min(page_size_mm) > 0
+    require(sound, "page_size_mm", "be positive and finite", page_size_mm)
+    u, v = np.linspace(0.0, width, shape[1]), np.linspace(0.0, height, shape[0])
     return np.stack(np.meshgrid(u, v), axis=-1)
 
 

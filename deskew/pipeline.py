@@ -11,6 +11,8 @@ import numpy.typing as npt
 from deskew import acquisition, flattening, restoration
 from deskew.acquisition import DecoderSettings, DenoiseSettings, DepthSettings, InkSettings, Outline, SweepSettings
 from deskew.errors import StepError, require
+from deskew.io import StiffnessMap
+from deskew.projection import project
 from deskew.restoration import Textures
 from deskew.types import (
     WHITE,
@@ -198,6 +200,29 @@ def span(
         outline.corners,
         filled_fraction=mesh.filled_fraction,
     )
+
+
+def with_stiffness(scan: Scan, materials: StiffnessMap) -> Scan:
+    """Give each quad of a scanned sheet the spring constant of the material seen at its middle (section 4.3).
+
+    Parameters
+    ----------
+    scan : Scan
+        The page.
+    materials : StiffnessMap
+        In the frame of the raw white image.
+
+    Raises
+    ------
+    InputError
+        If the map is not of the camera's size.
+    """
+    size = scan.camera.size
+    require(materials.size == size, "stiffness map", f"have the white image's size {size}", materials.size)
+    v = scan.sheet.vertices
+    middles = 0.25 * (v[:-1, :-1] + v[:-1, 1:] + v[1:, :-1] + v[1:, 1:])
+    constants = materials.at(project(scan.camera, middles).reshape(-1, 2)).reshape(middles.shape[:2])
+    return replace(scan, sheet=replace(scan.sheet, stiffness=constants))
 
 
 def restore(

@@ -16,6 +16,7 @@ from omegaconf import MISSING
 from deskew.errors import InputError, require
 
 BUDGETS = ("smoke", "paper", "full")
+SURFACE_KINDS = ("cylinder", "cone", "folds", "mirror", "physical")
 
 
 def setting(default: Any, allowed: str, holds: Callable[[Any], bool]) -> Any:
@@ -201,6 +202,29 @@ class RealBoardsSettings(Checked):
 
 
 @dataclass
+class SurfacesSettings(Checked):
+    """The flattening of meshes that store their flat sheet.
+
+    `paths`: meshes whose texture coordinates are the true flat places [mm], one a trial; none for generated ones.
+    `kinds`: of the generated ones, see `data_synth.surfaces`; a physical one takes minutes.
+    `noise_mm`: standard deviation of the noise that is added to their z.
+    """
+
+    group: ClassVar[str] = "surfaces."
+    paths: list[str] = setting(
+        [],
+        "be a list of OBJ or PLY files, one a trial",
+        lambda value: all(str(path).lower().endswith((".obj", ".ply")) for path in value),
+    )
+    kinds: list[str] = setting(
+        ["cylinder", "cone", "folds", "mirror"],
+        f"be a list of different ones of {', '.join(SURFACE_KINDS)}",
+        lambda value: len(set(value)) == len(value) > 0 and set(value) <= set(SURFACE_KINDS),
+    )
+    noise_mm: float = number(0.0, 0.0, 10.0, "mm")
+
+
+@dataclass
 class DecodersSettings(Checked):
     """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
 
@@ -235,6 +259,7 @@ class Config(Checked):
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
+    surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

@@ -10,11 +10,16 @@ from deskew.io.calibrations import read_calibration, write_calibration
 from deskew.io.captures import read_capture, write_capture
 from deskew.io.files import require_writable, write_bytes
 from deskew.io.images import read_image, write_image
-from deskew.io.meshes import Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
+from deskew.io.meshes import MESH_SUFFIXES, Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
 from deskew.io.scans import read_depth, read_depth_image, read_scan, write_depth, write_scan
+from deskew.io.stiffness import StiffnessMap, face_stiffness, read_stiffness
+from deskew.io.tifxyz import read_tifxyz
 
 __all__ = [
+    "MESH_SUFFIXES",
     "Mesh",
+    "StiffnessMap",
+    "face_stiffness",
     "grid_faces",
     "read_arrays",
     "read_board",
@@ -26,6 +31,8 @@ __all__ = [
     "read_mesh",
     "read_procam_graycode",
     "read_scan",
+    "read_stiffness",
+    "read_tifxyz",
     "require_writable",
     "sheet_mesh",
     "write_arrays",

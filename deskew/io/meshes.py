@@ -1,7 +1,6 @@
 """Triangle meshes, OBJ and PLY, with their vertices in the file's own order.
 
-PLY goes through trimesh. OBJ is read here: trimesh splits vertices at texture seams, drops those that no face uses and
-orders the rest anew, and a score against a mesh by another program stands or falls with that order.
+PLY goes through trimesh; OBJ does not, since trimesh would order its vertices anew (see `deskew.io.obj`).
 """
 
 from __future__ import annotations
@@ -12,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from deskew.errors import InputError, require
+from deskew.io import obj
 from deskew.io.files import read_bytes, shown, write_bytes
+from deskew.io.obj import Faces
 from deskew.types import Floats, Sheet
 
-Faces = npt.NDArray[np.int64]
+MESH_SUFFIXES = (".obj", ".ply")
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,44 +85,6 @@ def sheet_mesh(sheet: Sheet, texture: Floats | None = None) -> Mesh:
     return Mesh(sheet.vertices.reshape(-1, 3), faces, flat)
 
 
-def _index(word: str, n: int) -> int:
-    index = int(word)
-    index = index - 1 if index > 0 else n + index  # OBJ counts from 1, or backwards from the end
-    require(0 <= index < n, "index", f"be in [1, {n}]", word)
-    return index
-
-
-def _obj(data: bytes) -> Mesh:
-    vertices: list[list[float]] = []
-    textures: list[list[float]] = []
-    faces: list[tuple[int, int, int]] = []
-    texture_of: dict[int, int] = {}
-    for line in data.decode("utf-8").splitlines():
-        keyword, *words = line.split() or [""]
-        if keyword == "v":
-            require(len(words) >= 3, "a line `v`", "hold 3 numbers", shown(line))
-            vertices.append([float(word) for word in words[:3]])
-        elif keyword == "vt":
-            require(len(words) >= 2, "a line `vt`", "hold 2 numbers", shown(line))
-            textures.append([float(word) for word in words[:2]])
-        elif keyword == "f":
-            corners = [word.split("/") for word in words]
-            require(len(corners) >= 3, "a line `f`", "name 3 or more vertices", shown(line))
-            at = [_index(corner[0], len(vertices)) for corner in corners]
-            faces += [(at[0], at[i], at[i + 1]) for i in range(1, len(at) - 1)]
-            for vertex, corner in zip(at, corners, strict=True):
-                if len(corner) > 1 and corner[1]:
-                    used = texture_of.setdefault(vertex, _index(corner[1], len(textures)))
-                    same = textures[used] == textures[_index(corner[1], len(textures))]
-                    require(same, f"vertex {vertex + 1}", "have one texture coordinate (no seam)", "two")
-    require(len(faces) > 0, "mesh", "have faces", "none")
-    texture = None
-    if texture_of:
-        require(len(texture_of) == len(vertices), "every vertex", "have a texture coordinate", f"{len(texture_of)}")
-        texture = np.array([textures[texture_of[i]] for i in range(len(vertices))])
-    return Mesh(np.array(vertices), np.array(faces, dtype=np.int64), texture)
-
-
 def _ply(data: bytes) -> Mesh:
     import trimesh  # here, since it takes longer to import than most commands that need no mesh take to run
 
@@ -155,33 +117,45 @@ def read_mesh(path: Path) -> Mesh:
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    require(suffix in (".obj", ".ply"), str(path), "end in .obj or .ply", suffix or "no suffix")
+    require(suffix in MESH_SUFFIXES, str(path), f"end in {' or '.join(MESH_SUFFIXES)}", suffix or "no suffix")
     data = read_bytes(path)
     try:
-        return _obj(data) if suffix == ".obj" else _ply(data)
+        return Mesh(*obj.parsed(data.decode("utf-8"))) if suffix == ".obj" else _ply(data)
     except InputError as error:
         raise InputError(f"`{path}`: {error}") from error
     except Exception as error:  # a damaged file surfaces in trimesh as any of a dozen types, none of them its own
         raise InputError(f"`{path}` must be a valid mesh, got {shown(str(error))}.") from error
 
 
-def write_mesh(mesh: Mesh, path: Path) -> None:
-    """Write a mesh as binary PLY, whole or not at all; positions are float32, good to 0.0001 mm at a metre.
+def _ply_bytes(mesh: Mesh) -> bytes:
+    import trimesh
 
-    Texture coordinates become the vertex properties ``s`` and ``t`` that MeshLab and Blender read.
+    solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    if mesh.texture is not None:
+        solid.vertex_attributes["s"], solid.vertex_attributes["t"] = mesh.texture.T
+    return bytes(solid.export(file_type="ply", vertex_normal=False))
+
+
+def write_mesh(mesh: Mesh, path: Path) -> None:
+    """Write a mesh, vertices in their order, whole or not at all.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Vertices that no face uses stay.
+    path : Path
+        A PLY is binary: positions are float32, good to 0.0001 mm at a metre, and texture coordinates become the vertex
+        properties ``s`` and ``t`` that MeshLab and Blender read. An OBJ is text that reads back bit for bit.
 
     Raises
     ------
     InputError
-        If the suffix is not ``.ply``.
+        If the suffix is another.
     StepError
         If the file system refuses.
     """
-    import trimesh
-
     path = Path(path)
-    require(path.suffix.lower() == ".ply", str(path), "end in .ply", path.suffix or "no suffix")
-    solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    if mesh.texture is not None:
-        solid.vertex_attributes["s"], solid.vertex_attributes["t"] = mesh.texture.T
-    write_bytes(bytes(solid.export(file_type="ply", vertex_normal=False)), path)
+    suffix = path.suffix.lower()
+    require(suffix in MESH_SUFFIXES, str(path), f"end in {' or '.join(MESH_SUFFIXES)}", suffix or "no suffix")
+    text = suffix == ".obj"
+    write_bytes(obj.formatted(mesh.vertices, mesh.faces, mesh.texture).encode() if text else _ply_bytes(mesh), path)

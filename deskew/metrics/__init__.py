@@ -5,7 +5,9 @@ from deskew.metrics.corners import corner_distance
 from deskew.metrics.coverage import page_coverage
 from deskew.metrics.dense import dense_error
 from deskew.metrics.depth import depth_error
+from deskew.metrics.score import score_flattening
 from deskew.metrics.strain import flat_error, sheet_strain
+from deskew.metrics.stretch import sheet_stretch
 
 __all__ = [
     "Alignment",
@@ -16,5 +18,7 @@ __all__ = [
     "fit_rigid",
     "flat_error",
     "page_coverage",
+    "score_flattening",
     "sheet_strain",
+    "sheet_stretch",
 ]

@@ -5,50 +5,12 @@ The two are different things: lengths kept faithfully to a noisy scan give a sma
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
 from deskew.errors import require
 from deskew.metrics.alignment import distances, fit_affine, fit_rigid, require_not_mirrored
+from deskew.metrics.triangles import quad_triangles, sheet_edges, sheet_triangles, signed_areas, upward
 from deskew.types import Flattened, Floats, Sheet
-
-Triangles = npt.NDArray[np.integer[Any]]
-
-
-def _corner_triangles(rows: int, columns: int) -> Triangles:
-    """Return each quad's four corner triangles, (Q, 4, 3): every corner with its two neighbours."""
-    index = np.arange(rows * columns).reshape(rows, columns)
-    a, b = index[:-1, :-1].ravel(), index[:-1, 1:].ravel()
-    c, d = index[1:, 1:].ravel(), index[1:, :-1].ravel()
-    return np.stack([np.stack(t, axis=-1) for t in ((d, a, b), (a, b, c), (b, c, d), (c, d, a))], axis=1)
-
-
-def _quad_triangles(sheet: Sheet) -> Triangles:
-    """Corner triangles of a grid's quads that are not cut, (Q, 4, 3)."""
-    corners = _corner_triangles(*sheet.vertices.shape[:2])
-    return corners if sheet.cut is None else corners[~sheet.cut.ravel()]
-
-
-def _triangles(sheet: Sheet) -> Triangles:
-    if sheet.faces is not None:
-        return sheet.faces
-    # Corner triangles 1 (a, b, c) and 3 (c, d, a) are the two halves of the quad.
-    return _quad_triangles(sheet)[:, [1, 3]].reshape(-1, 3)
-
-
-def _edges(sheet: Sheet) -> Triangles:
-    """All edges once, (E, 2); of a grid its structural edges and both diagonals of each quad (section 3.2.2)."""
-    triangles = _quad_triangles(sheet).reshape(-1, 3) if sheet.faces is None else sheet.faces
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    return np.unique(np.sort(pairs, axis=1), axis=0)
-
-
-def _signed_areas(points: Floats, triangles: Triangles) -> Floats:
-    a, b, c = (points[triangles[..., k], :2] for k in range(3))
-    p, q = b - a, c - a
-    return np.asarray(0.5 * (p[..., 0] * q[..., 1] - p[..., 1] * q[..., 0]))
 
 
 def sheet_strain(sheet: Sheet, flattened: Flattened) -> dict[str, float]:
@@ -72,19 +34,19 @@ def sheet_strain(sheet: Sheet, flattened: Flattened) -> dict[str, float]:
     require(flattened.vertices.shape == shape, "flattened", f"have the sheet's shape {shape}", flattened.vertices.shape)
     before, after = sheet.vertices.reshape(-1, 3), flattened.vertices.reshape(-1, 3)
     require(bool(np.isfinite(after).all()), "flattened", "have finite vertices", "NaN or infinity")
-    i, j = _edges(sheet).T
+    i, j = sheet_edges(sheet).T
     old, new = np.linalg.norm(before[i] - before[j], axis=1), np.linalg.norm(after[i] - after[j], axis=1)
     require(float(old.min()) > 0, "sheet", "have no two joined vertices in one place", f"{int((old == 0).sum())} pairs")
-    triangles = _triangles(sheet)
-    # The sheet as seen from above says which way is up, so a sheet turned over entirely is all flips.
-    up = 1.0 if _signed_areas(before, triangles).sum() >= 0 else -1.0
+    triangles = sheet_triangles(sheet)
+    # The sheet as scanned says which way is up, so a sheet turned over entirely is all flips.
+    up = upward(sheet)
     figures = {
         "strain_rms": float(np.sqrt(((new / old - 1.0) ** 2).mean())),
         "length_change": float(new.sum() / old.sum() - 1.0),
-        "flips": float((up * _signed_areas(after, triangles) <= 0).sum()),
+        "flips": float((up * signed_areas(after, triangles) <= 0).sum()),
     }
     if sheet.faces is None:
-        areas = up * _signed_areas(after, _quad_triangles(sheet))
+        areas = up * signed_areas(after, quad_triangles(sheet))
         figures["folded_quads"] = float((areas <= 0).any(axis=1).sum())
     return figures
 

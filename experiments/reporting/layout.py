@@ -105,7 +105,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """A table of `timings.csv`: a line a condition and method that has any of the columns.
+    """A table of `timings.csv`: a line a condition and method that has the first column.
 
     Attributes
     ----------
@@ -139,8 +139,10 @@ class Layout:
         Figures of pictures; a picture in one of them is not written by itself.
     sections : tuple of Section
         Parts of the summary, instead of one table of all conditions by the headline metrics.
-    times, profile : Times or None
-        Of a study of speed: what heads `table.md`, and what is written as `profile.md`.
+    times : tuple of Times
+        Tables of times that head `table.md`.
+    profile : Times or None
+        Of a study of speed: what is written as `profile.md`.
     """
 
     title: str
@@ -149,5 +151,5 @@ class Layout:
     plots: tuple[Plot, ...] = ()
     montages: tuple[Montage, ...] = ()
     sections: tuple[Section, ...] = ()
-    times: Times | None = None
+    times: tuple[Times, ...] = ()
     profile: Times | None = None

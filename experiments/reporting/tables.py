@@ -39,8 +39,8 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timi
         Shown where the layout asks for times.
     """
     parts = [f"# {layout.title}", layout.note]
-    if layout.times is not None:
-        parts += [f"## {layout.times.title}", layout.times.note, _times(layout.times, timings)]
+    for times in layout.times:
+        parts += [f"## {times.title}", times.note, _times(times, timings)]
     headlines = [column for column in layout.columns if column.headline]
     if headlines or layout.sections:
         parts += [
@@ -83,7 +83,7 @@ def _times(times: Times, timings: Sequence[Row]) -> str:
             ),
         ]
         for place, values in found
-        if any(value is not None for value in values)
+        if values[0] is not None
     ]
     return markdown_table(("condition", "method", *(column.heading for column in times.columns)), lines)
 

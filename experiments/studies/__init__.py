@@ -14,6 +14,7 @@ STUDIES = {
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
     "real_boards": "experiments.studies.real_boards:RealBoards",
+    "surfaces": "experiments.studies.surfaces:Surfaces",
     "speed": "experiments.studies.speed:Speed",
 }
 

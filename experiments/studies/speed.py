@@ -17,6 +17,7 @@ from deskew.errors import require
 from deskew.types import Calibration, Capture, Correspondence, DepthMap
 from experiments.reporting import Column, Layout, Times
 from experiments.settings import Config
+from experiments.studies import flattening_times
 from experiments.studies.methods import require_methods
 from experiments.studies.stopwatch import TRIAD, Stopwatch
 from experiments.studies.study import Study
@@ -60,28 +61,36 @@ class Speed(Study):
         Corners and joint bundle of the decoded boards.
     `ink`, `depth_map`, `denoise`, `mesh`, `flatten`, `restore`
         The stages of a scan and a restoration, on the temporal reading; `flatten` for each method.
+    `45`, `100`, `200`, `400`, `1000`
+        Flattening alone of a crumpled grid with so many vertices a side, by `spring`, `arap` (up to 400), `lscm` and
+        `slim` (up to 200), whatever `method` says.
+    `mesh/45`, `mesh/100`, `mesh/200`
+        The same grids as triangle meshes, by `spring` and `arap`.
     """
 
     layout: ClassVar[Layout] = Layout(
         "Speed",
         "Times are of one process on one thread; they are comparable between machines as ratios only.",
         (Column("frames", "frames", 0), Column("depth_coverage", "pixels with a depth", 4)),
-        times=Times(
-            "CPU time",
-            "Median of the repetitions after a warm-up, whose extra time (compiling, or loading what was compiled "
-            "before) stands apart. A triad moves the bytes of a full sweep's frames once. `peak` is the whole "
-            "process's, with all that it has imported; under `decode` it includes the frames, which streaming does "
-            "not keep. The bars: a full sweep photographed, rendered and decoded in about 2 s, a quarter of it "
-            "decoding, in at most 700 MB.",
-            (
-                Column("triads", "triads", 1),
-                Column("seconds_cpu", "CPU [s]", 3),
-                Column("seconds_min", "min [s]", 3),
-                Column("seconds_max", "max [s]", 3),
-                Column("seconds_warmup", "warm-up [s]", 2),
-                Column("peak_mb", "peak [MB]", 0),
+        times=(
+            Times(
+                "CPU time",
+                "Median of the repetitions after a warm-up, whose extra time (compiling, or loading what was compiled "
+                "before) stands apart. A triad moves the bytes of a full sweep's frames once. `peak` is the whole "
+                "process's, with all that it has imported; under `decode` it includes the frames, which streaming does "
+                "not keep. The bars: a full sweep photographed, rendered and decoded in about 2 s, a quarter of it "
+                "decoding, in at most 700 MB.",
+                (
+                    Column("triads", "triads", 1),
+                    Column("seconds_cpu", "CPU [s]", 3),
+                    Column("seconds_min", "min [s]", 3),
+                    Column("seconds_max", "max [s]", 3),
+                    Column("seconds_warmup", "warm-up [s]", 2),
+                    Column("peak_mb", "peak [MB]", 0),
+                ),
+                _STAGES,
             ),
-            _STAGES,
+            flattening_times.TIMES,
         ),
         profile=Times(
             "Where the time goes",
@@ -113,6 +122,7 @@ class Speed(Study):
         record.add("depth_map", "-", {"depth_coverage": float(np.isfinite(depth.z).mean())})
         _time_restoration(watch, capture, calibration, depth, config)
         watch.finish()
+        flattening_times.time_flattening(record, rng, config.trials)
         return record.outcome()
 
 

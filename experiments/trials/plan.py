@@ -16,7 +16,7 @@ from experiments.trials.schema import TrialKey
 # What is ablated stands in the trial's own key.
 _NO_PART_OF_A_ROW = ("engine", "out", "budget", "trials", "trials_at", "ablations")
 # Keys that belong to one experiment only.
-_SECTIONS = ("real_boards",)
+_SECTIONS = ("real_boards", "surfaces")
 # Sources that rows come from; reporting and the program around it change no row.
 SOURCES = (
     "deskew",
@@ -50,9 +50,9 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
     settings["method"] = config.methods
     for key, path in inputs.items():
         settings[f"sha256 of {key}"] = content_digest(sorted(path.rglob("*")) if path.is_dir() else [path], path)
-    if "real_boards" in settings:
-        settings["real_boards"].pop("path")
-    settings["sheet"] = {name: value for name, value in settings["sheet"].items() if name != "paths"}
+    # The kinds of surfaces, as what is ablated, stand in the trial's own key.
+    for group, key in (("real_boards", "path"), ("sheet", "paths"), ("surfaces", "paths"), ("surfaces", "kinds")):
+        settings.get(group, {}).pop(key, None)
     return settings
 
 

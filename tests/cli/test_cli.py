@@ -36,7 +36,7 @@ from deskew.types import (
     Status,
 )
 
-COMMANDS = ("calibrate", "scan", "accuracy", "restore", "run")
+COMMANDS = ("calibrate", "scan", "accuracy", "flatten", "restore", "run", "score")
 SIZE = (12, 8)
 CAMERA = Pinhole(
     SIZE, np.array([[10.0, 0, 5.5], [0, 10, 3.5], [0, 0, 1]]), np.zeros(5), np.eye(3), np.array([0, 0, 9.0])
@@ -86,6 +86,10 @@ class StandIn:
         x, y = np.meshgrid(np.linspace(-1, 1, shape[1]), np.linspace(1, -1, shape[0]))
         sheet = Sheet(np.stack([x, y, 0 * x], -1))
         return Scan({"white": page.white, **page.textures}, depth, CAMERA, sheet, np.zeros((4, 2)), self.check)
+
+    def with_stiffness(self, scan: Scan, materials: io.StiffnessMap) -> Scan:
+        self._step("stiffness", materials=materials)
+        return scan
 
     def restore_lights(self, scan: Scan, *, method: str, lights: Sequence[str], scale: float) -> Textures:
         self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale)
@@ -185,6 +189,31 @@ def test_run_goes_from_a_folder_to_a_page(here: Path, steps: StandIn, capsys: py
     assert steps.calls["restore"]["method"] == "paper_rk4"
     assert len(steps.calls["scan"]["frames"]) == 12
     assert np.array_equal(io.read_image(here / "out" / "r.tif"), capture().white[::-1])
+
+
+@pytest.mark.parametrize("start", ["run page -c c.json", "restore scan.npz"])
+def test_a_stiffness_map_is_taken_when_asked_for(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], start: str
+) -> None:
+    (here / "mask.toml").write_text("[stiffness]\n255 = 3.5\n")
+    assert run(f"{start} -o out/r.png", capsys)[0] == 0
+    assert "stiffness" not in steps.calls
+    assert run(f"{start} -o out/s.png --stiffness mask.png", capsys)[0] == 0
+    materials = steps.calls["stiffness"]["materials"]
+    assert (materials.size, dict(materials.constants)) == (SIZE, {255: 3.5})
+    steps.calls.clear()
+    code, out, err = run(f"{start} -o out/t.png --stiffness dark.png", capsys)
+    assert (code, out, err) == (2, "", "deskew: `dark.toml` must be a file, got nothing there.\n")
+    assert not steps.calls
+
+
+def test_a_map_of_another_size_is_refused_before_the_scan(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "small.toml").write_text("[stiffness]\n255 = 3.5\n")
+    wanted = "deskew: `small.png` must be 12x8 px, got 4x4 px.\n"
+    assert run("run page -c c.json -o out/r.png --stiffness small.png", capsys) == (2, "", wanted)
+    assert not steps.calls
 
 
 @pytest.mark.parametrize("start", ["run page -c c.json", "restore scan.npz"])
@@ -465,10 +494,11 @@ def test_the_module_ends_with_the_exit_code() -> None:
 
 def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
     program = (
-        "import sys; from deskew import cli\n"
-        "def restore(found, method, wanted, as_json): wanted.output.touch(); cli._report({}, as_json, wanted.output)\n"
-        "cli._restore = restore\n"
-        "sys.exit(cli.main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
+        "import sys; from deskew.cli import main, printing, restoring\n"
+        "def restore(found, method, wanted, as_json):\n"
+        "    wanted.output.touch(); printing.report({}, as_json, wanted.output)\n"
+        "restoring.restore_page = restore\n"
+        "sys.exit(main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
     )
     with Path("/dev/full").open("w") as full:
         line = [sys.executable, "-c", program]

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from deskew.errors import InputError
+from deskew.errors import InputError, StepError
 from deskew.io import Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
 from deskew.types import Sheet
 
@@ -65,6 +65,42 @@ def test_a_ply_keeps_order_and_textures(tmp_path: Path, shuffled: Mesh) -> None:
     assert found.texture is not None
     used = np.unique(shuffled.faces)
     assert np.array_equal(found.texture[used], shuffled.texture[used])  # type: ignore[index]
+
+
+@pytest.mark.parametrize("with_texture", [True, False])
+def test_an_obj_reads_back_bit_for_bit_in_the_same_order(tmp_path: Path, shuffled: Mesh, with_texture: bool) -> None:
+    """Also the vertices that no face uses, which trimesh would drop, and two in one place, which it would merge."""
+    vertices = shuffled.vertices.copy()
+    vertices[7] = vertices[3]
+    mesh = Mesh(vertices / 3.0, shuffled.faces, shuffled.texture if with_texture else None)
+    write_mesh(mesh, tmp_path / "a.obj")
+    found = read_mesh(tmp_path / "a.obj")
+    assert found.vertices.tobytes() == mesh.vertices.tobytes()
+    assert np.array_equal(found.faces, mesh.faces)
+    assert (found.texture is None) == (mesh.texture is None)
+    if mesh.texture is not None and found.texture is not None:
+        assert found.texture.tobytes() == mesh.texture.tobytes()
+
+
+def test_another_program_reads_the_obj_that_is_written(tmp_path: Path, shuffled: Mesh) -> None:
+    import trimesh
+
+    write_mesh(Mesh(shuffled.vertices, shuffled.faces), tmp_path / "a.obj")
+    seen = trimesh.load(tmp_path / "a.obj", process=False, maintain_order=True, force="mesh")
+    triangles = shuffled.vertices[shuffled.faces]
+    assert np.allclose(np.asarray(seen.vertices)[np.asarray(seen.faces)], triangles, rtol=0, atol=1e-12)
+
+
+def test_nothing_is_left_of_an_obj_that_cannot_be_written(
+    tmp_path: Path, shuffled: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*args: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(StepError, match=r"Writing `.*a\.obj` failed: No space left on device"):
+        write_mesh(shuffled, tmp_path / "a.obj")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_negative_indices_and_polygons_are_read(tmp_path: Path) -> None:
@@ -142,6 +178,6 @@ def test_a_wrong_ply_is_refused(tmp_path: Path, case: str) -> None:
 def test_other_formats_are_refused(tmp_path: Path, shuffled: Mesh) -> None:
     with pytest.raises(InputError, match=r"must end in \.obj or \.ply, got \.stl"):
         read_mesh(tmp_path / "a.stl")
-    with pytest.raises(InputError, match=r"must end in \.ply, got \.stl"):
+    with pytest.raises(InputError, match=r"must end in \.obj or \.ply, got \.stl"):
         write_mesh(shuffled, tmp_path / "a.stl")
     assert list(tmp_path.iterdir()) == []

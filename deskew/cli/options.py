@@ -1,0 +1,45 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+CaptureFolder = Annotated[
+    Path, typer.Argument(metavar="CAPTURE", help="Capture folder (capture.toml, white.png, ...).")
+]
+CalibrationFile = Annotated[Path, typer.Option("--calibration", "-c", help="calibration.json of the same devices.")]
+Shape = Annotated[tuple[int, int], typer.Option("--shape", metavar="R C", help="Mesh vertices down and across.")]
+Mask = Annotated[
+    Path | None,
+    typer.Option("--mask", metavar="IMAGE", help="The page in the camera's picture, not black; found if not given."),
+]
+Ink = Annotated[bool, typer.Option("--ink", help="Take out what ink does to the depth; the paper does not.")]
+Denoise = Annotated[
+    bool, typer.Option("--denoise", help="Filter the depth, its creases kept; use with --ink on a printed page.")
+]
+Method = Annotated[str, typer.Option("--method", "-m", help="Flattening method.")]
+Lights = Annotated[
+    list[str] | None,
+    typer.Option("--light", "-l", metavar="NAME", help="Light to restore; may be repeated. White unless any is named."),
+]
+Combine = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--combine",
+        metavar="HOW",
+        help="mean, max, ratio:A/B or components of the named lights, or of all; may be repeated.",
+    ),
+]
+Scale = Annotated[float, typer.Option("--scale", metavar="S", help="Restored pixels for each of the camera's.")]
+Stiffness = Annotated[
+    Path | None,
+    typer.Option(
+        "--stiffness",
+        metavar="MAP.png",
+        help="Grey picture of material labels, with MAP.toml beside it: [stiffness], LABEL = k_s [kg/s^2].",
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]

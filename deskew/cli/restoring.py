@@ -1,0 +1,122 @@
+"""Commands that restore: `restore` and `run`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from deskew.cli.flattening import require_method
+from deskew.cli.options import (
+    CalibrationFile,
+    CaptureFolder,
+    Combine,
+    Denoise,
+    Ink,
+    Json,
+    Lights,
+    Mask,
+    Method,
+    Scale,
+    Shape,
+    Stiffness,
+)
+from deskew.cli.pictures import PICTURES, Wanted, write_pictures
+from deskew.cli.printing import flattened_figures, projector_figures, report
+from deskew.cli.scanning import Scanning, scan_page
+
+if TYPE_CHECKING:
+    from deskew.types import Scan
+
+
+def restore(
+    scan_file: Annotated[Path, typer.Argument(metavar="SCAN", help="scan.npz from `deskew scan`.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
+    method: Method = "paper_euler",
+    stiffness: Stiffness = None,
+    lights: Lights = None,
+    combine: Combine = None,
+    scale: Scale = 1.0,
+    as_json: Json = False,
+) -> None:
+    """Flatten a scanned page and texture it: the restored image, under any of its lights.
+
+    With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
+
+    A stiffness map has the white image's frame.
+
+    Example: deskew restore scan.npz -o restored.png --light white --light uv --combine ratio:uv/white
+    """
+    from deskew import io
+
+    io.require_writable(output, PICTURES)
+    wanted = Wanted.of(output, lights, combine, scale)
+    materials = None if stiffness is None else io.read_stiffness(stiffness)
+    found = io.read_scan(scan_file)
+    wanted.check(list(found.images))
+    if materials is not None:
+        from deskew import pipeline
+
+        found = pipeline.with_stiffness(found, materials)
+    restore_page(found, method, wanted, as_json)
+
+
+def run(
+    capture: CaptureFolder,
+    calibration: CalibrationFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
+    method: Method = "paper_euler",
+    stiffness: Stiffness = None,
+    shape: Shape = (45, 45),
+    mask: Mask = None,
+    ink: Ink = False,
+    denoise: Denoise = False,
+    lights: Lights = None,
+    combine: Combine = None,
+    scale: Scale = 1.0,
+    as_json: Json = False,
+) -> None:
+    """Take a capture folder to a restored page: scan, flatten, texture, under any of its lights.
+
+    With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
+
+    A stiffness map has the white image's frame.
+
+    Example: deskew run page/ --calibration calibration.json -o restored.png --light uv
+    """
+    from deskew import io
+
+    io.require_writable(output, PICTURES)
+    require_method(method)
+    wanted = Wanted.of(output, lights, combine, scale)
+    how = Scanning(shape, mask, ink, denoise, stiffness)
+    restore_page(scan_page(capture, io.read_calibration(calibration), how, wanted), method, wanted, as_json)
+
+
+def restore_page(found: Scan, method: str, wanted: Wanted, as_json: bool) -> None:
+    """Flatten and texture a scanned page, write its pictures and print the figures."""
+    import numpy as np
+
+    from deskew import pipeline, restoration
+
+    known = list(found.images)
+    needed = wanted.needed(known)
+    restored = pipeline.restore_lights(found, method=method, lights=needed, scale=wanted.scale)
+    page = np.isfinite(restored.backward_map[..., 0])
+    pictures = {light: restored.images[light] for light in wanted.shown}
+    for how in wanted.combine:
+        parts = {light: restored.images[light] for light in wanted.combined(how, known)}
+        pictures |= restoration.combined(parts, page, how)
+    paths = wanted.paths(known)
+    figures: dict[str, Any] = {"restored": [str(path) for path in paths.values()], "method": method}
+    if len(paths) == 1:
+        figures["restored"] = str(wanted.output)
+    if restored.flattened is not None:
+        figures |= flattened_figures(restored.flattened, "page")
+    for light, fit in restored.registrations.items():
+        figures |= {f"{light}_scale": fit.scale.tolist(), f"{light}_offset_px": fit.offset.tolist()}
+        figures[f"{light}_residual_px"] = fit.residual_px
+    figures |= projector_figures(found.projector)
+    write_pictures(pictures, paths)
+    report(figures, as_json, *paths.values())

@@ -1,0 +1,80 @@
+"""The command that compares a flattening by any program with the truth: `score`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from deskew.cli.options import Json
+from deskew.cli.printing import report, say
+from deskew.errors import require
+
+if TYPE_CHECKING:
+    from deskew.io import Mesh
+    from deskew.types import Array, Floats
+
+FlatFile = Annotated[
+    Path,
+    typer.Argument(metavar="FLAT", help="Flattened mesh in mm: OBJ, texture coordinates if present, else x y; or PLY."),
+]
+TruthFile = Annotated[
+    Path, typer.Option("--truth", "-t", help="OBJ of the bent mesh, its texture coordinates the true flat places [mm].")
+]
+
+
+def score(flat_file: FlatFile, truth_file: TruthFile, as_json: Json = False) -> None:
+    """Score a flattening made by any program: distance from the truth, stretch against the bent surface, flips.
+
+    Both files hold the same vertices in the same order, and the same faces. The true v may run up or down. The
+    flattening shows the surface from above, or from the front of its faces if it lies neither up nor down; one that
+    is mirrored is an error, code 3.
+
+    Figures: flat_mean_mm and flat_max_mm after an affine fit, flat_rigid_mean_mm and flat_rigid_max_mm after a rigid
+    one; stretch_l2 and stretch_linf of the map from the plane to the surface (Sander 2001), stretch_inverse_l2 and
+    stretch_inverse_linf of the map from the surface to the plane, infinite (null in JSON) if a face is flipped;
+    area_error, the mean relative change of area; angle_mean_deg; flips, the number of faces turned over; folds, the
+    number of edges along which the sheet folds over.
+
+    Example: deskew score flat.obj --truth page.obj --json
+    """
+    from deskew import io
+
+    truth, flat = io.read_mesh(truth_file), io.read_mesh(flat_file)
+    require(truth.texture is not None, str(truth_file), "hold texture coordinates, the flat places [mm]", "none")
+    n = len(truth.vertices)
+    require(len(flat.vertices) == n, str(flat_file), f"have the truth's {n} vertices", len(flat.vertices))
+    _require_same_faces(flat.faces, truth.faces, flat_file)
+    from deskew import metrics
+
+    by_texture = flat_file.suffix.lower() == ".obj" and flat.texture is not None and not _carried_along(flat, truth)
+    places: Floats = flat.texture if by_texture and flat.texture is not None else flat.vertices[:, :2]
+    if not by_texture and flat.vertices[:, 2].any():
+        say(f"warning: {flat_file.name} is not flat on z = 0; only its x and y are scored")
+    assert truth.texture is not None
+    figures = metrics.score_flattening(truth.sheet, truth.texture, places, same_axes=by_texture)
+    head = {"flat": str(flat_file), "truth": str(truth_file), "places": "texture" if by_texture else "xy"}
+    report({**head, "vertices": n, "faces": len(truth.faces), **figures}, as_json)
+
+
+def _carried_along(flat: Mesh, truth: Mesh) -> bool:
+    """Whether a file flat on z = 0 holds but the truth's own texture, as flattening keeps it: no result to score."""
+    import numpy as np
+
+    return not flat.vertices[:, 2].any() and np.array_equal(flat.texture, truth.texture)  # type: ignore[arg-type]
+
+
+def _require_same_faces(found: Array, wanted: Array, path: Path) -> None:
+    """Refuse other faces than the truth's; their order, and where each begins, is left to the other program."""
+    import numpy as np
+
+    def ordered(faces: Array) -> Array:
+        turns = (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3
+        faces = np.take_along_axis(faces, turns, axis=1)
+        return faces[np.lexsort(faces.T[::-1])]
+
+    require(len(found) == len(wanted), str(path), f"have the truth's {len(wanted)} faces", len(found))
+    if not np.array_equal(found, wanted):
+        other = int((ordered(found) != ordered(wanted)).any(axis=1).sum())
+        require(other == 0, str(path), "have the truth's faces, wound alike", f"{other} others")

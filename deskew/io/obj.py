@@ -1,0 +1,106 @@
+"""OBJ text: vertices, one texture coordinate a vertex, and triangles, in the file's own order, exact to the last bit.
+
+trimesh splits vertices at texture seams, drops those that no face uses and orders the rest anew, and a score against a
+mesh by another program stands or falls with that order. So OBJ is read and written here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from deskew.errors import require
+from deskew.io.files import shown
+from deskew.types import Array, Floats
+
+Faces = npt.NDArray[np.int64]
+
+
+def _index(word: str, n: int) -> int:
+    index = int(word)
+    index = index - 1 if index > 0 else n + index  # OBJ counts from 1, or backwards from the end
+    require(0 <= index < n, "index", f"be in [1, {n}]", word)
+    return index
+
+
+def parsed(text: str) -> tuple[Floats, Faces, Floats | None]:
+    """Read OBJ text; faces of more corners are cut into triangles.
+
+    Returns
+    -------
+    vertices : (V, 3) array
+        Every vertex of the text, in its order.
+    faces : (F, 3) int array
+        Indices from 0.
+    texture : (V, 2) array or None
+        Texture coordinate of each vertex, None if no face names one.
+
+    Raises
+    ------
+    InputError
+        If a line is damaged, there are no faces, or a vertex has two texture coordinates or alone has none.
+    ValueError
+        If a word is no number.
+    """
+    vertices: list[list[float]] = []
+    textures: list[list[float]] = []
+    faces: list[tuple[int, int, int]] = []
+    texture_of: dict[int, int] = {}
+    for line in text.splitlines():
+        keyword, *words = line.split() or [""]
+        if keyword == "v":
+            require(len(words) >= 3, "a line `v`", "hold 3 numbers", shown(line))
+            vertices.append([float(word) for word in words[:3]])
+        elif keyword == "vt":
+            require(len(words) >= 2, "a line `vt`", "hold 2 numbers", shown(line))
+            textures.append([float(word) for word in words[:2]])
+        elif keyword == "f":
+            corners = [word.split("/") for word in words]
+            require(len(corners) >= 3, "a line `f`", "name 3 or more vertices", shown(line))
+            at = [_index(corner[0], len(vertices)) for corner in corners]
+            faces += [(at[0], at[i], at[i + 1]) for i in range(1, len(at) - 1)]
+            for vertex, corner in zip(at, corners, strict=True):
+                if len(corner) > 1 and corner[1]:
+                    used = texture_of.setdefault(vertex, _index(corner[1], len(textures)))
+                    same = textures[used] == textures[_index(corner[1], len(textures))]
+                    require(same, f"vertex {vertex + 1}", "have one texture coordinate (no seam)", "two")
+    require(len(faces) > 0, "mesh", "have faces", "none")
+    return np.array(vertices), np.array(faces, dtype=np.int64), _texture(len(vertices), textures, texture_of)
+
+
+def _texture(n_vertices: int, textures: list[list[float]], texture_of: dict[int, int]) -> Floats | None:
+    """One coordinate a vertex; where the two lists run side by side, also of those that no face uses."""
+    if not texture_of:
+        return None
+    if len(textures) == n_vertices and all(vertex == used for vertex, used in texture_of.items()):
+        return np.array(textures)
+    require(len(texture_of) == n_vertices, "every vertex", "have a texture coordinate", f"{len(texture_of)}")
+    return np.array([textures[texture_of[i]] for i in range(n_vertices)])
+
+
+def _lines(keyword: str, rows: Array) -> Iterable[str]:
+    # repr is the shortest text that reads back as the very same number.
+    return (f"{keyword} {' '.join(map(repr, row))}\n" for row in rows.tolist())
+
+
+def formatted(vertices: Floats, faces: Array, texture: Floats | None) -> str:
+    """Write OBJ text that :func:`parsed` reads back bit for bit.
+
+    Parameters
+    ----------
+    vertices : (V, 3) array
+        Positions.
+    faces : (F, 3) int array
+        Indices from 0.
+    texture : (V, 2) array or None
+        Texture coordinate of each vertex.
+    """
+    lines = [*_lines("v", np.asarray(vertices, dtype=np.float64))]
+    if texture is not None:
+        lines += _lines("vt", np.asarray(texture, dtype=np.float64))
+    corner = "{0}" if texture is None else "{0}/{0}"
+    words = [corner.format(i + 1) for i in range(len(vertices))]
+    lines += (f"f {words[a]} {words[b]} {words[c]}\n" for a, b, c in np.asarray(faces).tolist())
+    return "".join(lines)

@@ -1,0 +1,219 @@
+"""`deskew flatten`: any mesh in, the same mesh flat; and stiffness maps for it and for scanned pages."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from deskew import pipeline
+from deskew.flattening import METHODS
+from deskew.io import Mesh, read_mesh, read_stiffness, write_image, write_mesh
+from deskew.types import DepthMap, Flattened, Pinhole, Scan, Sheet, Status
+
+Command = Callable[[str], tuple[int, str, str]]
+
+METHOD = """
+from dataclasses import replace
+from deskew.types import Flattened, Status
+
+seen = []
+
+def press(sheet, **settings):
+    seen.append((sheet, settings))
+    return Flattened(sheet.vertices * [1.0, 1.0, 0.0], Status.AT_REST, "", {"iterations": 3.0})
+
+def lock(sheet):
+    return Flattened(sheet.vertices, Status.LOCKED, "push harder")
+
+def burst(sheet):
+    return Flattened(sheet.vertices, Status.DIVERGED, "smaller steps")
+"""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, page: Mesh) -> Path:
+    """A working folder with meshes of every form and an empty `out`; the method `own:press` projects."""
+    assert page.texture is not None
+    write_mesh(replace(page, texture=(page.texture - [0, -30]) / [40, 30]), tmp_path / "page.obj")
+    write_mesh(page, tmp_path / "page.ply")
+    write_mesh(Mesh(page.vertices, page.faces), tmp_path / "bare.obj")
+    (tmp_path / "segment").mkdir()
+    for k, axis in enumerate("xyz"):
+        cv2.imwrite(str(tmp_path / f"segment/{axis}.tif"), page.vertices[:, k].reshape(7, 21).astype(np.float32))
+    write_image(np.repeat([[7, 200]], 2, axis=0).astype(np.uint8), tmp_path / "m.png")
+    (tmp_path / "m.toml").write_text("[stiffness]\n7 = 0.5\n200 = 20\n")
+    (tmp_path / "own.py").write_text(METHOD)
+    (tmp_path / "out").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(importlib.sys.modules, "own", raising=False)  # type: ignore[attr-defined]
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", ["page.obj", "page.ply", "bare.obj"])
+@pytest.mark.parametrize("suffix", [".ply", ".obj"])
+def test_the_same_vertices_and_faces_come_out_flat(here: Path, deskew: Command, name: str, suffix: str) -> None:
+    code, out, err = deskew(f"flatten {name} -o out/flat{suffix} --method own:press --json")
+    assert (code, err) == (0, "")
+    assert json.loads(out) == {
+        "flat": f"out/flat{suffix}",
+        "method": "own:press",
+        "vertices": 147,
+        "faces": 240,
+        "status": "at_rest",
+        "iterations": 3.0,
+    }
+    before, after = read_mesh(here / name), read_mesh(here / "out" / f"flat{suffix}")
+    assert np.array_equal(after.faces, before.faces)
+    assert not after.vertices[:, 2].any()
+    assert np.allclose(after.vertices[:, :2], before.vertices[:, :2], rtol=0, atol=1e-5)
+    assert (after.texture is None) == (before.texture is None)
+    if before.texture is not None and after.texture is not None:
+        assert np.allclose(after.texture, before.texture, rtol=0, atol=1e-6)
+
+
+def test_a_tifxyz_folder_is_scaled_by_its_voxels(here: Path, deskew: Command, page: Mesh) -> None:
+    assert deskew("flatten segment -o out/flat.obj --voxel 0.5 -m own:press")[0] == 0
+    found = read_mesh(here / "out" / "flat.obj")
+    assert np.allclose(found.vertices[:, :2], 0.5 * page.vertices[:, :2], rtol=0, atol=1e-5)
+    assert np.array_equal(found.faces, page.faces)
+
+
+def test_of_a_folder_in_pieces_the_largest_is_taken_on_request(here: Path, deskew: Command) -> None:
+    x = cv2.imread(str(here / "segment/x.tif"), cv2.IMREAD_UNCHANGED)
+    x[:, 4] = -1.0
+    cv2.imwrite(str(here / "segment/x.tif"), x)
+    line = "flatten segment -o out/flat.ply --voxel 0.5 -m own:press"
+    code, out, err = deskew(line)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "must be one connected piece, got 2 pieces of 90, 18 quads; ask for the `largest` alone." in err
+    assert deskew(f"{line} --largest")[0] == 0
+    assert len(read_mesh(here / "out" / "flat.ply").vertices) == 7 * 16
+
+
+@pytest.mark.parametrize(
+    ("option", "noise"), [("", "auto"), ("--noise auto", "auto"), ("--noise 0.3", 0.3), ("--noise 0", 0.0)]
+)
+def test_noise_is_estimated_by_the_default_method_unless_given(
+    here: Path, deskew: Command, monkeypatch: pytest.MonkeyPatch, option: str, noise: str | float
+) -> None:
+    asked: list[dict[str, Any]] = []
+
+    def spring(sheet: Sheet, **settings: Any) -> Flattened:
+        asked.append(settings)
+        return Flattened(sheet.vertices * [1.0, 1.0, 0.0], Status.AT_REST)
+
+    monkeypatch.setitem(METHODS, "spring", spring)
+    code, out, err = deskew(f"flatten page.obj -o out/flat.ply {option} --json")
+    assert (code, err, json.loads(out)["method"]) == (0, "", "spring")
+    assert asked == [{"noise_mm": noise}]
+
+
+def test_a_stiffness_map_is_looked_up_by_texture(here: Path, deskew: Command, page: Mesh) -> None:
+    assert deskew("flatten page.obj -o out/flat.ply --stiffness m.png -m own:press")[0] == 0
+    sheet, settings = importlib.import_module("own").seen[-1]
+    assert page.texture is not None
+    left = page.texture[page.faces].mean(axis=1)[:, 0] < 20
+    assert np.array_equal(sheet.stiffness, np.where(left, 0.5, 20.0))
+    assert settings == {}
+
+
+def test_what_is_not_at_rest_is_written_and_said_so(here: Path, deskew: Command) -> None:
+    code, out, err = deskew("flatten page.obj -o out/flat.ply -m own:lock --json")
+    assert (code, json.loads(out)["status"]) == (0, "locked")
+    assert err == "deskew: warning: the sheet is locked, not at rest and flat: push harder\n"
+    assert (here / "out" / "flat.ply").exists()
+
+
+def test_what_diverged_is_an_error(here: Path, deskew: Command) -> None:
+    code, out, err = deskew("flatten page.obj -o out/flat.ply -m own:burst")
+    assert (code, out, err) == (3, "", "deskew: Flattening diverged: smaller steps\n")
+    assert list((here / "out").iterdir()) == []
+
+
+WRONG = {
+    "no input": ("flatten -o out/f.ply", "Missing argument 'IN'"),
+    "no output": ("flatten page.obj", "Missing option '--output'"),
+    "input missing": ("flatten gone.obj -o out/f.ply -m own:press", "`gone.obj` must be a file, got nothing there"),
+    "input an image": ("flatten m.png -o out/f.ply -m own:press", "`m.png` must end in .obj or .ply, got .png"),
+    "output an image": ("flatten page.obj -o out/f.png", "`out/f.png` must end in .obj or .ply, got .png"),
+    "output in no folder": ("flatten page.obj -o no/f.ply", "`no/f.ply` must lie in an existing folder"),
+    "unknown method": ("flatten page.obj -o out/f.ply -m iron", "`method` must be one of "),
+    "noise of another method": (
+        "flatten page.obj -o out/f.ply -m own:press --noise 0.3",
+        "`--noise` must be left out, since only the method spring removes noise, got 0.3",
+    ),
+    "noise of words": ("flatten page.obj -o out/f.ply --noise loud", "`--noise` must be auto or lie in [0, 1000] mm"),
+    "noise negative": ("flatten page.obj -o out/f.ply --noise -0.1", "`--noise` must be auto or lie in [0, 1000] mm"),
+    "noise NaN": (
+        "flatten page.obj -o out/f.ply --noise nan",
+        "`--noise` must be auto or lie in [0, 1000] mm",
+    ),
+    "no voxel": ("flatten segment -o out/f.ply -m own:press", "`--voxel` must be given for a tifxyz folder"),
+    "voxel 0": ("flatten segment -o out/f.ply -m own:press --voxel 0", "`voxel` must be in (0, 10] [mm], got 0.0"),
+    "voxel of a mesh": (
+        "flatten page.obj -o out/f.ply -m own:press --voxel 1",
+        "`--voxel` must be left out",
+    ),
+    "piece of a mesh": ("flatten page.obj -o out/f.ply -m own:press --largest", "`--largest` must be left out"),
+    "no tifxyz": ("flatten out -o out/f.ply -m own:press --voxel 1", "`out/x.tif` must be a file, got nothing there"),
+    "stiffness without texture": (
+        "flatten bare.obj -o out/f.ply -m own:press --stiffness m.png",
+        "`bare.obj` must have texture coordinates for a stiffness map, got none",
+    ),
+    "stiffness missing": ("flatten page.obj -o out/f.ply -m own:press --stiffness n.png", "`n.png` must be a file"),
+    "texture in mm": (
+        "flatten page.ply -o out/f.ply -m own:press --stiffness m.png",
+        "`texture` must lie in [0, 1], got -30 to 40",
+    ),
+    "page for a grid": ("flatten page.obj -o out/f.ply -m paper_rk4", "must"),
+}
+
+
+@pytest.mark.parametrize("case", list(WRONG))
+def test_a_wrong_line_is_one_line_and_code_2(here: Path, deskew: Command, case: str) -> None:
+    line, message = WRONG[case]
+    code, out, err = deskew(line)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
+    assert list((here / "out").iterdir()) == []
+
+
+@pytest.fixture
+def scan() -> Scan:
+    """A flat page of two quads by three, seen from above: 10 pixels a millimetre, the middle at (12.5, 8.5)."""
+    K = np.array([[10.0, 0, 12.5], [0, 10, 8.5], [0, 0, 1]])
+    camera = Pinhole((26, 18), K, np.zeros(5), np.diag([1.0, -1, -1]), np.array([0, 0, 1.0]))
+    x, y = np.meshgrid([-0.9, -0.3, 0.3, 0.9], [0.6, 0.0, -0.6])
+    depth = DepthMap(np.ones((18, 26)), np.zeros((18, 26), np.uint8), camera)
+    white = np.zeros((18, 26), np.uint8)
+    return Scan({"white": white}, depth, camera, Sheet(np.stack([x, y, 0 * x], axis=-1)), np.zeros((4, 2)))
+
+
+def test_a_scans_quads_have_the_material_that_is_seen_at_their_middles(here: Path, scan: Scan) -> None:
+    """Middles lie at x = 6.5, 12.5, 18.5 and y = 5.5, 11.5: the border of two materials runs between them."""
+    labels = np.full((18, 26), 7, np.uint8)
+    labels[9:, 10:] = 200
+    write_image(labels, here / "m.png")
+    found = pipeline.with_stiffness(scan, read_stiffness(here / "m.png"))
+    assert found.sheet.stiffness is not None
+    assert found.sheet.stiffness.tolist() == [[0.5, 0.5, 0.5], [0.5, 20.0, 20.0]]
+    assert found.sheet.vertices.tobytes() == scan.sheet.vertices.tobytes()
+
+
+def test_a_map_of_another_size_is_refused(here: Path, scan: Scan, deskew: Command) -> None:
+    from deskew.io import write_scan
+
+    write_scan(scan, here / "scan.npz")
+    code, out, err = deskew("restore scan.npz -o out/r.png --stiffness m.png -m own:press")
+    assert (code, out) == (2, "")
+    assert err == "deskew: `stiffness map` must have the white image's size (26, 18), got (2, 2).\n"
+    assert list((here / "out").iterdir()) == []

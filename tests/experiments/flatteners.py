@@ -1,0 +1,37 @@
+"""Methods under test for the study of surfaces, which know that their sheet is a cylinder of 25 mm about Y."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from deskew.types import Flattened, Floats, Sheet, Status
+
+NOISE_SEEN: list[float] = []
+
+
+def _unrolled(sheet: Sheet) -> Floats:
+    x, y, z = sheet.vertices.T
+    return np.column_stack([25.0 * np.arctan2(x, z), y, 0 * y])
+
+
+def unroll(sheet: Sheet, **settings: Any) -> Flattened:
+    radius = np.linalg.norm(sheet.vertices[:, [0, 2]], axis=1)
+    NOISE_SEEN.append(float(np.abs(radius - 25.0).max()))
+    return Flattened(_unrolled(sheet), Status.AT_REST, "", {"noise_estimated_mm": 0.25} | settings)
+
+
+def project(sheet: Sheet) -> Flattened:
+    return Flattened(sheet.vertices * [1.0, 1.0, 0.0], Status.LOCKED, "push harder")
+
+
+def fold(sheet: Sheet) -> Flattened:
+    flat = _unrolled(sheet)
+    if len(flat) > 100:
+        flat[40, 0] += 2.5
+    return Flattened(flat, Status.FOLDED, "try again")
+
+
+def mirror(sheet: Sheet) -> Flattened:
+    return Flattened(_unrolled(sheet) * [-1.0, 1.0, 1.0], Status.AT_REST)
