@@ -1,6 +1,17 @@
 """Flattening: the paper's mass-spring particle system (section 3), and the same springs solved for rest at once."""
 
+from deskew.flattening.materials import middles, with_stiffness
 from deskew.flattening.methods import DEFAULT, METHODS, Flattener, find_method, flatten
 from deskew.flattening.settings import ParticleSettings, StaticSettings
 
-__all__ = ["DEFAULT", "METHODS", "Flattener", "ParticleSettings", "StaticSettings", "find_method", "flatten"]
+__all__ = [
+    "DEFAULT",
+    "METHODS",
+    "Flattener",
+    "ParticleSettings",
+    "StaticSettings",
+    "find_method",
+    "flatten",
+    "middles",
+    "with_stiffness",
+]

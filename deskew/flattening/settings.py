@@ -54,8 +54,9 @@ class StaticSettings:
     ----------
     k_s, rest, bending, more
         As in `SpringSettings`, but `rest` is "section" unless asked for otherwise.
-    energy : str
-        "springs", or "arap": as rigid as possible on the same lengths.
+    energy : str or None
+        "springs", or "arap": as rigid as possible on the same lengths. None: springs on a grid, and on a triangle mesh,
+        whose springs do not resist being turned over, the other.
     noise_mm : float or "auto"
         Standard deviation of the scanner's noise across the sheet [mm], in [0, 1000], which is removed before lengths
         are taken; "auto" estimates it from the mesh.
@@ -63,25 +64,31 @@ class StaticSettings:
         Change of a coordinate in one iteration that counts as none, in units of the sheet's size, in [1e-12, 1e-2].
     max_iterations : int
         In [1, 1e9].
+    through : int
+        Flatten every n-th vertex of a grid alone, with the others as its `surface`, and lay those down between them; in
+        [1, 1000].
     """
 
     k_s: float = 1.0
     rest: str = "section"
     bending: float = 0.0
     more: float = 0.0
-    energy: str = "springs"
+    energy: str | None = None
     noise_mm: float | str = 0.0
-    tolerance: float = 1e-6
+    tolerance: float = 2e-7
     max_iterations: int = 2000
+    through: int = 1
 
     def __post_init__(self) -> None:
         _ = self.springs
-        require(self.energy in ENERGIES, "energy", f"be one of {', '.join(ENERGIES)}", repr(self.energy))
+        named = self.energy is None or self.energy in ENERGIES
+        require(named, "energy", f"be one of {', '.join(ENERGIES)}, or None", repr(self.energy))
         noise = self.noise_mm == AUTO or (_is_number(self.noise_mm) and 0 <= float(self.noise_mm) <= 1000)
         require(noise, "noise_mm", 'be "auto" or in [0, 1000] mm', repr(self.noise_mm))
         fine = _is_number(self.tolerance) and 1e-12 <= self.tolerance <= 1e-2
         require(fine, "tolerance", "be a number in [1e-12, 0.01]", repr(self.tolerance))
         require_whole("max_iterations", self.max_iterations, 1, MAX_STEPS)
+        require_whole("through", self.through, 1, 1000)
 
     @property
     def springs(self) -> SpringSettings:

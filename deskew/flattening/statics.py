@@ -11,10 +11,11 @@ quads are counted at the end; if there are any, the search begins again from a f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from deskew.errors import require
 from deskew.flattening import newton
 from deskew.flattening.anderson import Iterated, accelerate
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
@@ -31,8 +32,11 @@ _STARTS = (16, 32, 64, 128)
 _OVER = 1.7
 # Above this ratio of the stiffest to the softest spring, local-global takes hundreds of steps and Newton a few.
 _EVEN = 4.0
-# A coarse level only starts the next one: it need not settle further than this share of a vertex spacing.
-_COARSE_TOLERANCE, _COARSE_ITERATIONS = 2e-3, 200
+# Smooth changes are the slowest to settle, and cheap on a coarse level: share of a vertex spacing that counts as none.
+_COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-4, 200
+
+# Share of a sheet's area, as seen from above, that must show its back before its grid counts as mirrored.
+_UPSIDE_DOWN = 0.25
 
 _FOLDED = "{folded} quads are folded over: scan the page again with more vertices, or remove noise (`noise_mm`)."
 _UNSETTLED = "The springs are still moving after {n} iterations: raise `max_iterations` or `tolerance`."
@@ -67,6 +71,8 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
         `iterations`, `residual_mm`, `spring_energy` [uJ], `folded_quads` and `starts`, the searches made. With its
         `surface`, where the sheet has one.
     """
+    if settings.through > 1:
+        return _through(sheet, settings)
     springs = grid_springs(sheet, settings.springs)
     tolerance = settings.tolerance * float(max(np.ptp(sheet.vertices[..., axis]) for axis in range(3)))
     found, folded, n_starts = _unfolded(sheet, springs, tolerance, settings.max_iterations)
@@ -89,11 +95,28 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     return Flattened(flat, status, remedy, counters, inside)
 
 
+def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
+    """Flatten a dense grid through every n-th of its vertices."""
+    n, shape = settings.through, sheet.vertices.shape
+    fits = sheet.surface is None and sheet.stiffness is None and sheet.cut is None
+    require(fits, "through", "be 1 for a sheet with a surface, a stiffness or cuts of its own", n)
+    whole = all((size - 1) % n == 0 and size > n for size in shape[:2])
+    require(whole, "through", f"divide both sides' {shape[0] - 1} and {shape[1] - 1} quads", n)
+    coarse = Sheet(sheet.vertices[::n, ::n], surface=sheet.vertices)
+    flat = flatten_grid(coarse, replace(settings, through=1))
+    assert flat.surface is not None
+    folded = int(count_folded(flat.surface, np.zeros((shape[0] - 1, shape[1] - 1), bool), _handedness(sheet.vertices)))
+    counters = {**flat.counters, "folded_quads": float(folded)}
+    if folded and flat.status is Status.AT_REST:
+        return Flattened(flat.surface, Status.FOLDED, _FOLDED.format(folded=folded), counters)
+    return Flattened(flat.surface, flat.status, flat.remedy, counters)
+
+
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:
     """Search from finer and finer starts until nothing is folded; return the result, its folded quads, the searches."""
-    pyramid = _pyramid(sheet, springs)
     even = _is_even(springs)
     uniform = hierarchy(spring_constants(springs.grid, 1.0))
+    pyramid = _pyramid(sheet, springs, len(uniform.levels))
     solver = uniform if even and np.ptp(springs.k_s[springs.k_s > 0]) == 0 and not springs.cut.any() else None
     starts = list(dict.fromkeys(_level_within(pyramid, limit) for limit in (*_STARTS, max(springs.grid))))
     n_starts = 0
@@ -117,8 +140,8 @@ def _is_even(springs: Springs) -> bool:
     return len(springs.rest) == 4 and float(there.max()) <= _EVEN * float(there.min())
 
 
-def _pyramid(sheet: Sheet, springs: Springs) -> list[_Grid]:
-    """Levels from the finest to one of 3 vertices a side; a coarse spring is as long as the two that it spans.
+def _pyramid(sheet: Sheet, springs: Springs, n_levels: int) -> list[_Grid]:
+    """Levels from fine to coarse; a coarse spring is as long as the two that it spans.
 
     Coarse levels know neither cuts nor stiffness: they only start the search.
     """
@@ -127,7 +150,7 @@ def _pyramid(sheet: Sheet, springs: Springs) -> list[_Grid]:
         chords = chord_lengths(sheet.vertices)
         rest = np.where(rest > 0, rest, chords)
     grids = [_Grid(rest, sheet.vertices)]
-    while max(grids[-1].shape) > 3:
+    while len(grids) < n_levels:
         grids.append(_coarser(grids[-1]))
     return grids
 
@@ -147,7 +170,7 @@ def _coarser(fine: _Grid) -> _Grid:
 
 
 def _level_within(pyramid: list[_Grid], limit: int) -> int:
-    """Return the finest level of at most `limit` vertices a side."""
+    """Return the finest level of at most `limit` vertices a side; the coarsest if none is as small."""
     return next(level for level, grid in enumerate(pyramid) if max(grid.shape) <= limit or level == len(pyramid) - 1)
 
 
@@ -178,9 +201,15 @@ def _settle(x: Floats, springs: Springs, solver: Hierarchy, at: int, tolerance: 
 
 
 def _handedness(vertices: Floats) -> float:
-    """1 if a grid's rows run to the left of its columns as seen from above, as y does beside x; else -1."""
-    across, down = vertices[1:, 1:, :2] - vertices[:-1, :-1, :2], vertices[1:, :-1, :2] - vertices[:-1, 1:, :2]
-    return 1.0 if float((across[..., 0] * down[..., 1] - across[..., 1] * down[..., 0]).sum()) > 0 else -1.0
+    """-1 if a grid's columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored.
+
+    A sheet rolled by more than half a turn shows some of its back, but never as much as a quarter of its area.
+    """
+    across, down = vertices[1:, 1:] - vertices[:-1, :-1], vertices[1:, :-1] - vertices[:-1, 1:]
+    # Twice a quad's area is the cross product of its diagonals.
+    normals = np.cross(across, down)
+    seen = float(normals[..., 2].sum())
+    return 1.0 if seen > _UPSIDE_DOWN * float(np.sqrt(np.einsum("ijk,ijk->ij", normals, normals)).sum()) else -1.0
 
 
 def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:

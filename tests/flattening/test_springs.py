@@ -5,9 +5,9 @@ import pytest
 
 from deskew.errors import InputError
 from deskew.flattening.settings import SpringSettings
-from deskew.flattening.springs import grid_springs
+from deskew.flattening.springs import grid_springs, section_lengths, unfolded_lengths
 from deskew.types import Sheet
-from tests.flattening.bent_sheets import flat_grid
+from tests.flattening.bent_sheets import cylinder, flat_grid
 
 
 def joined(grid: tuple[int, int]) -> set[frozenset[int]]:
@@ -85,3 +85,42 @@ def test_a_sheet_in_one_piece_has_the_springs_of_a_sheet_that_says_nothing() -> 
     told = grid_springs(Sheet(vertices, cut=np.zeros((3, 4), dtype=bool)), SpringSettings(10.0))
     assert np.array_equal(plain.k_s, told.k_s)
     assert np.array_equal(plain.rest, told.rest)
+
+
+def test_sections_follow_an_arc_and_chords_cut_it_short() -> None:
+    bent, _ = cylinder(20.0, (9, 161))
+    coarse = Sheet(bent[::8, ::8], surface=bent)
+    arc = 100.0 / 20
+    section = grid_springs(coarse, SpringSettings(rest="section")).rest[0, :, :-1]
+    chord = grid_springs(coarse, SpringSettings(rest="chord")).rest[0, :, :-1]
+    assert np.abs(section / arc - 1).max() < 1e-4
+    assert np.all(chord < arc * (1 - 2e-3))
+
+
+def test_unfolded_lengths_give_back_on_average_what_chords_cut_off_at_a_crease() -> None:
+    # A ridge of 50 degrees at a place that no sample knows.
+    missing, taken = [], []
+    for place in np.linspace(40.0, 60.0, 41):
+        u = np.linspace(0.0, 100.0, 49)
+        x = np.where(u < place, u * np.cos(0.4), place * np.cos(0.4) + (u - place) * np.cos(0.5))
+        z = np.where(u < place, u * np.sin(0.4), place * np.sin(0.4) - (u - place) * np.sin(0.5))
+        surface = np.stack(np.broadcast_arrays(x, -np.linspace(0, 50, 13)[:, None], z), axis=-1)
+        missing.append(100.0 - section_lengths(surface, 4)[0, 0, :-1].sum())
+        taken.append(100.0 - unfolded_lengths(surface, 4)[0, 0, :-1].sum())
+    assert np.mean(missing) > 0.05
+    assert abs(np.mean(taken)) < 0.1 * np.mean(missing)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(5, 7), (3, 3)])
+def test_springs_of_two_steps_join_vertices_two_apart(rows: int, columns: int) -> None:
+    sheet = Sheet(flat_grid((rows, columns), (6.0 * (columns - 1), 6.0 * (rows - 1))))
+    a, b, rest, k_s = grid_springs(sheet, SpringSettings(2.0, bending=0.5, more=0.25)).pairs()
+    places = sheet.vertices.reshape(-1, 3)
+    assert np.allclose(np.linalg.norm(places[a] - places[b], axis=1), rest)
+    lengths, counts = np.unique(np.round(rest, 6), return_counts=True)
+    assert np.allclose(lengths, [6.0, 6 * np.sqrt(2), 12.0, 12 * np.sqrt(2)])
+    shear = (rows - 1) * (columns - 1) * 2
+    far = rows * (columns - 2) + (rows - 2) * columns, 2 * (rows - 2) * (columns - 2)
+    assert counts.tolist() == [rows * (columns - 1) + (rows - 1) * columns, shear, *far]
+    assert set(k_s[np.isclose(rest, 12.0)]) == {1.0}
+    assert set(k_s[np.isclose(rest, 12 * np.sqrt(2))]) == {0.5}
