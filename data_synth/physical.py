@@ -89,8 +89,8 @@ def physical(
     rng : numpy Generator
         The only source of randomness.
     shape : (rows, columns)
-        Grid. Time and memory grow with columns times rows cubed and squared: 121 x 156 take half a minute and .4 GB,
-        241 x 311 some minutes and 3 GB.
+        Grid. Time and memory grow with columns times rows cubed and squared: 121 x 156 take 10 to 20 s of one core and
+        a band of .3 GB, 240 x 310 some 110 s and 2.6 GB.
     page_size_mm : (width, height)
         Page [mm].
     slope_p90_deg : float
@@ -142,7 +142,7 @@ def _crumpled(
     x = relax(x, replace(plate, pull=np.zeros(plate.pull.shape)), 12)
     if levels[-1] == last:
         return x
-    along, across, twist = plate.rest
+    along, across, twist = plate.rest  # the cells' centres are stretched to the border, by half a cell at most
     rest = (_linear(along, last), _linear(across, last), _linear(twist, (last[0] - 1, last[1] - 1)))
     return relax(_resampled(x, last), _plate(last, sizes, paper, rest), 8)
 
