@@ -24,7 +24,9 @@ from deskew.types import Floats
 _LEVELS = ((61, 79), (121, 156))  # (short side, long side); the grid asked for comes last
 _ATTEMPTS = 5
 _LEAST_THICKNESS = 0.06  # of the spacing: a ridge narrower than a cell would cling to the grid
-_SPRING_BACK = 0.85  # slope that is left when the sheet is let go, over the slope under load
+# Slope that is left when the sheet is let go, over that under load: it is less if creases formed on the coarsest grid
+# alone, since the next one sharpens them without yielding.
+_SPRING_BACK, _SPRING_BACK_COARSE = 0.85, 0.74
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +89,12 @@ def physical(
     rng : numpy Generator
         The only source of randomness.
     shape : (rows, columns)
-        Grid. Time and memory grow with columns times rows cubed and squared: 121 x 156 take half a minute and .4 GB,
-        241 x 311 some minutes and 3 GB.
+        Grid. Time and memory grow with columns times rows cubed and squared: 121 x 156 take 10 to 20 s of one core and
+        a band of .3 GB, 240 x 310 some 110 s and 2.6 GB.
     page_size_mm : (width, height)
         Page [mm].
     slope_p90_deg : float
-        Wanted 90th percentile of the slope, in [3, 30]; the sheet's own is measured, and some 10 % off.
+        Wanted 90th percentile of the slope, in [3, 30]; the sheet's own comes out within some 10 % of it.
     paper : Paper
         Material.
 
@@ -130,16 +132,17 @@ def _crumpled(
     levels = [(n, m) for m, n in _LEVELS if n < last[0] and m < last[1]] or [last]
     x = _flat(levels[0], sizes)
     amplitude = 0.25
+    loaded = slope_p90_deg / (_SPRING_BACK_COARSE if len(levels) == 1 and levels != [last] else _SPRING_BACK)
     for level in levels:
         # The last of these levels does the last of the pulling, so that its creases form on the way.
-        loaded = slope_p90_deg / _SPRING_BACK * (1.0 if level == levels[-1] else 0.9)
+        share = 1.0 if level == levels[-1] else 0.9
         x = _resampled(x, level)
         plate = _plate(level, sizes, paper, unbent(level))  # creases form anew, sharper
-        x, plate, amplitude = _pulled(x, plate, handles, amplitude, loaded, paper)
+        x, plate, amplitude = _pulled(x, plate, handles, amplitude, share * loaded, paper)
     x = relax(x, replace(plate, pull=np.zeros(plate.pull.shape)), 12)
     if levels[-1] == last:
         return x
-    along, across, twist = plate.rest
+    along, across, twist = plate.rest  # the cells' centres are stretched to the border, by half a cell at most
     rest = (_linear(along, last), _linear(across, last), _linear(twist, (last[0] - 1, last[1] - 1)))
     return relax(_resampled(x, last), _plate(last, sizes, paper, rest), 8)
 
