@@ -66,7 +66,8 @@ def test_every_form_of_a_flattening_is_read(here: Path, page: Mesh, deskew: Comm
 
 
 def test_a_texture_that_flattening_only_carried_along_is_no_result(here: Path, page: Mesh, deskew: Command) -> None:
-    write_mesh(replace(flat(page, 1.02 * true(page)), texture=page.texture), here / "flat.obj")
+    rounded = np.round(true(page), 3)
+    write_mesh(replace(flat(page, 1.02 * true(page)), texture=rounded), here / "flat.obj")
     code, out, _ = deskew("score flat.obj --truth truth.obj --json")
     figures = json.loads(out)
     assert (code, figures["places"]) == (0, "xy")
