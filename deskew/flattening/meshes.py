@@ -22,10 +22,11 @@ import numpy.typing as npt
 from deskew.errors import StepError, require, require_positive, require_whole
 from deskew.flattening.conformal import lscm, signed_areas, tutte
 from deskew.flattening.descent import minimise
+from deskew.flattening.edges import Edges, Indices, edges_of
 from deskew.flattening.energies import ENERGIES, BuildEnergy, Energy
 from deskew.flattening.intrinsic import Triangles, bearings, triangles
 from deskew.flattening.laplace import Laplacian
-from deskew.flattening.topology import Disc, Edges, Indices, disc_of, edges_of
+from deskew.flattening.topology import Disc, disc_of
 from deskew.flattening.unfolding import unfold
 from deskew.types import Flattened, Floats, Sheet, Status
 from deskew.types.arrays import require_numbers

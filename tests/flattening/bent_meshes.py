@@ -39,7 +39,7 @@ def arch(shape: tuple[int, int] = (25, 41)) -> Mesh:
 
 
 def roll(turns: float, shape: tuple[int, int] = (9, 121), inner_mm: float = 15.0, gap_mm: float = 3.0) -> Mesh:
-    """A sheet rolled to a spiral about Y; its development measures along the chords, as the mesh can."""
+    """A sheet rolled to a spiral about Y; its development measures along the chords, as the mesh does."""
     angle = np.linspace(0, 2 * np.pi * turns, shape[1])
     radius = inner_mm + gap_mm * angle / (2 * np.pi)
     x, z = radius * np.cos(angle), radius * np.sin(angle)

@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from deskew.flattening.edges import edges_of
 from deskew.flattening.energies import ENERGIES, Energy
 from deskew.flattening.intrinsic import bearings, triangles
 from deskew.flattening.laplace import Laplacian, laplacian
-from deskew.flattening.topology import edges_of
 from deskew.types import Array
 from tests.flattening.bent_meshes import irregular_fold
 

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from deskew.errors import InputError
 from deskew.flattening.conformal import lscm, signed_areas, tutte
+from deskew.flattening.edges import edges_of
 from deskew.flattening.energies import springs
 from deskew.flattening.intrinsic import triangles
 from deskew.flattening.laplace import laplacian
 from deskew.flattening.meshes import flatten_mesh
-from deskew.flattening.topology import edges_of
 from deskew.types import Array, Sheet, Status
 from tests.flattening.bent_meshes import arch, error_mm, folded_mesh, irregular_fold, meshed, roll
 from tests.flattening.bent_sheets import flat_grid

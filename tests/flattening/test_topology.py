@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from deskew.errors import InputError
+from deskew.flattening.edges import border_loops, edges_of
 from deskew.flattening.meshes import flatten_mesh
-from deskew.flattening.topology import border_loops, disc_of, edges_of
+from deskew.flattening.topology import disc_of
 from deskew.types import Array, Sheet, Status
 from tests.flattening.bent_meshes import error_mm, folded_mesh, halves, irregular_fold, moebius, torus
 
