@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import block_array, csc_array
 
+from deskew.flattening.edges import Edges, Indices, border_loops
 from deskew.flattening.intrinsic import Triangles
 from deskew.flattening.laplace import factor, laplacian
-from deskew.flattening.topology import Edges, Indices, border_loops
 from deskew.types import Floats
 
 

@@ -9,23 +9,41 @@ Teran et al., Robust quasistatic finite elements and flesh simulation, SCA 2005 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.sparse import coo_array, csc_array, kron
 
-from deskew.flattening.anderson import Iterated, accelerate
+from deskew.flattening.anderson import accelerate
 from deskew.flattening.energies import Energy
 from deskew.flattening.laplace import Laplacian, factor
 from deskew.types import Floats
 
 _RIDGE = 1e-9  # of the Laplacian's diagonal: neither moving nor turning the whole sheet costs anything
 _SHORTEST_STEP = 1e-6
-_NEWTON_STEPS = 40  # it takes 3 to 10, or is caught among springs that buckle
-_PATIENCE = 150  # local and global steps after which Newton's method is the cheaper one
+
+
+class Descent(NamedTuple):
+    """Where a descent came to.
+
+    Attributes
+    ----------
+    x : (V, 2) array
+        [mm].
+    n_iterations : int
+        Steps taken.
+    converged : bool
+        Whether the last step changed no coordinate by more than was asked for, or none could lower the energy.
+    """
+
+    x: Floats
+    n_iterations: int
+    converged: bool
 
 
 def minimise(
     model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int, *, uneven: bool = False
-) -> tuple[Floats, int]:
+) -> Descent:
     """Go down an energy until no coordinate changes by more than `step_mm` in a step.
 
     Parameters
@@ -42,43 +60,23 @@ def minimise(
         Steps after which to give up.
     uneven : bool
         Whether the stiffness varies so strongly that only Newton's method will do.
-
-    Returns
-    -------
-    x : (V, 2) array
-        [mm].
-    n_iterations : int
-        Steps taken.
     """
-    n = 0
-    if not uneven:
-        found = local_global(model, system, start, step_mm, min(max_iterations, _PATIENCE))
-        start, n = found.x, found.n_iterations
-        if found.converged or n == max_iterations:
-            return start, n
-    x, more = newton(model, system, start, step_mm, min(max_iterations - n, _NEWTON_STEPS))
-    return x, n + more
+    return (newton if uneven else local_global)(model, system, start, step_mm, max_iterations)
 
 
-def local_global(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> Iterated:
+def local_global(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> Descent:
     """Find the edges' best vectors, then the best places for them, until no coordinate changes by more than `step_mm`.
 
     The system is factored once; every step solves it once.
     """
-    return accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, max_iterations)
+    found = accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, max_iterations)
+    return Descent(found.x, found.n_iterations, found.converged)
 
 
-def newton(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> tuple[Floats, int]:
+def newton(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> Descent:
     """Newton's method on the positive part of the Hessian, with a line search, until a step is below `step_mm`.
 
     Unlike local and global steps it does not mind a stiff part in a soft sheet, which turns as a whole.
-
-    Returns
-    -------
-    x : (V, 2) array
-        [mm].
-    n_iterations : int
-        Systems that were factored.
     """
     L = system.matrix
     both = kron(L, np.eye(2), format="csc")
@@ -91,11 +89,11 @@ def newton(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_
         while (there := model.value(x + length * move)) > value + 1e-4 * length * slope + 1e-13 * abs(value):
             length /= 2
             if length < _SHORTEST_STEP:
-                return x, n
+                return Descent(x, n, slope > -1e-9 * abs(value))
         x, value = x + length * move, there
         if float(np.abs(move).max()) <= step_mm:
-            return x, n
-    return x, max_iterations
+            return Descent(x, n, True)
+    return Descent(x, max_iterations, False)
 
 
 def _newton_move(model: Energy, both: csc_array, x: Floats, gradient: Floats) -> Floats:

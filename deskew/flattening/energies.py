@@ -21,8 +21,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numba import njit
 
+from deskew.flattening.edges import Edges, Indices
 from deskew.flattening.intrinsic import Triangles
-from deskew.flattening.topology import Edges, Indices
 from deskew.types import Floats
 
 

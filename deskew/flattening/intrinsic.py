@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from deskew.flattening.topology import Edges, Indices
+from deskew.flattening.edges import Edges, Indices
 from deskew.types import Floats
 
 _SHORTEST = 1e-6  # of the mean edge: shorter ones count as this long

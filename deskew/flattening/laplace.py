@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from deskew.flattening.topology import Indices
+from deskew.flattening.edges import Indices
 from deskew.types import Floats
 
 

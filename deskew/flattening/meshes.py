@@ -22,10 +22,11 @@ import numpy.typing as npt
 from deskew.errors import StepError, require, require_positive, require_whole
 from deskew.flattening.conformal import lscm, signed_areas, tutte
 from deskew.flattening.descent import minimise
+from deskew.flattening.edges import Edges, Indices, edges_of
 from deskew.flattening.energies import ENERGIES, BuildEnergy, Energy
 from deskew.flattening.intrinsic import Triangles, bearings, triangles
 from deskew.flattening.laplace import Laplacian
-from deskew.flattening.topology import Disc, Edges, Indices, disc_of, edges_of
+from deskew.flattening.topology import Disc, disc_of
 from deskew.flattening.unfolding import unfold
 from deskew.types import Flattened, Floats, Sheet, Status
 from deskew.types.arrays import require_numbers
@@ -70,7 +71,8 @@ def flatten_mesh(
         best, with z = 0. A mesh that mostly faces up or down is seen from above, never mirrored; any other one (a
         scroll) lies with its faces counter-clockwise. A vertex without a face lies at its nearest neighbour's place.
         Counters: `iterations`, `flips`, `energy` (of a mean stiffness of 1 kg/s^2) [uJ], `healed_vertices`,
-        `healed_faces`, and `stiffened_faces`, which were turned over at first and made stiffer to lie right.
+        `healed_faces`, and `stiffened_faces`, which were turned over at first and made stiffer to lie right;
+        `converged`, 1 or 0.
 
     Raises
     ------
@@ -96,11 +98,18 @@ def flatten_mesh(
     counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": found.energy}
     counters |= disc.counts
     counters["healed_faces"] += plate.shapes.n_mended
-    counters["stiffened_faces"] = float(found.stiffened)
-    status, remedy = Status.AT_REST, ""
-    if found.flips:
-        status, remedy = Status.FOLDED, f"{found.flips} faces are turned over: {_REMEDY}"
+    counters |= {"stiffened_faces": float(found.stiffened), "converged": float(found.converged)}
+    status, remedy = _outcome(found)
     return Flattened(placed[disc.representative], status, remedy, counters)
+
+
+def _outcome(found: _Found) -> tuple[Status, str]:
+    """How it ended, and what to try."""
+    if found.flips:
+        return Status.FOLDED, f"{found.flips} faces are turned over: {_REMEDY}"
+    if not found.converged:
+        return Status.LOCKED, "not at rest after the last step: raise `max_iterations`, or smooth the surface's noise"
+    return Status.AT_REST, ""
 
 
 class _Plate(NamedTuple):
@@ -132,6 +141,7 @@ class _Found(NamedTuple):
     flips: int
     energy: float
     stiffened: int
+    converged: bool
 
 
 def _solve(plate: _Plate, stiffness: Floats, build: BuildEnergy, step_mm: float, max_iterations: int) -> _Found:
@@ -142,11 +152,11 @@ def _solve(plate: _Plate, stiffness: Floats, build: BuildEnergy, step_mm: float,
     best: _Found | None = None
     iterations = 0
     for start in plate.starts(model, system):
-        x, n = minimise(model, system, start, step_mm, max_iterations, uneven=uneven)
+        x, n, converged = minimise(model, system, start, step_mm, max_iterations, uneven=uneven)
         iterations += n
         flips = int(plate.turned_over(x).sum())
         if np.isfinite(x).all() and (best is None or flips < best.flips):
-            best = _Found(x, iterations, flips, model.value(x), 0)
+            best = _Found(x, iterations, flips, model.value(x), 0, converged)
         # A wrong start turns whole regions over, a hard surface here and there a face.
         if best is not None and best.flips <= _FEW * len(plate.faces):
             break
@@ -168,11 +178,11 @@ def _stiffened(
         stiffness = np.where(around, _STIFFEN * stiffness, stiffness)
         model = build(plate.shapes, plate.faces, plate.edges, stiffness)
         system = Laplacian(plate.edges.ends, model.weights, plate.n_vertices)
-        x, n = minimise(model, system, found.x, step_mm, max_iterations)
+        x, n, converged = minimise(model, system, found.x, step_mm, max_iterations)
         if not np.isfinite(x).all():
             break
         flips = int(plate.turned_over(x).sum())
-        found = _Found(x, found.iterations + n, flips, model.value(x), int(touched.sum()))
+        found = _Found(x, found.iterations + n, flips, model.value(x), int(touched.sum()), converged)
         if flips < best.flips:
             best = found
         if not flips:

@@ -18,8 +18,8 @@ import numpy as np
 
 from deskew.errors import InputError, require
 from deskew.flattening.conformal import signed_areas
+from deskew.flattening.edges import Indices, edges_of
 from deskew.flattening.meshes import aligned, faces_from_above
-from deskew.flattening.topology import Indices, edges_of
 from deskew.types import Flattened, Floats, Sheet, Status
 
 ARAP_ITERATIONS = 20

@@ -9,37 +9,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from deskew.errors import require
+from deskew.flattening.edges import Edges, Indices, border_loops, edges_of
 from deskew.types import Array, Floats, Sheet
 
-Indices = npt.NDArray[np.int64]
-
 _COINCIDENT = 1e-9  # vertices closer than this share of the mesh's size lie in one place
-
-
-class Edges(NamedTuple):
-    """The edges of a triangle mesh.
-
-    Attributes
-    ----------
-    ends : (E, 2) int array
-        Vertices of each edge, the smaller index first, sorted by the first and then by the second.
-    of_face : (F, 3) int array
-        The k-th edge of a face joins its corners k and k + 1.
-    opposite : (3 F,) int array
-        The half-edge 3 f + k runs from corner k of face f to corner k + 1; this is the one on the same edge's other
-        side, -1 at a border.
-    """
-
-    ends: Indices
-    of_face: Indices
-    opposite: Indices
 
 
 class Disc(NamedTuple):
@@ -68,22 +47,6 @@ class Disc(NamedTuple):
     representative: Indices
     kept: Indices
     counts: dict[str, float]
-
-
-def edges_of(faces: Array) -> Edges:
-    """Find the edges of triangles (F, 3); of an edge with more than two faces, the last two are opposite.
-
-    This order of edges is the one that per-edge arrays, such as rest lengths, are given in.
-    """
-    corners = np.ascontiguousarray(faces, dtype=np.int64)
-    start, end = corners.ravel(), corners[:, (1, 2, 0)].ravel()
-    n = int(corners.max()) + 1
-    keys = np.minimum(start, end) * n + np.maximum(start, end)
-    order = np.argsort(keys)
-    of_half, n_edges, opposite = _pair(keys, order)
-    ends = np.empty((n_edges, 2), dtype=np.int64)
-    ends[of_half, 0], ends[of_half, 1] = np.minimum(start, end), np.maximum(start, end)
-    return Edges(ends, of_half.reshape(-1, 3), opposite)
 
 
 def disc_of(sheet: Sheet) -> Disc:
@@ -215,16 +178,6 @@ def _not_disc(disc: Disc) -> tuple[str, str] | None:
     return None
 
 
-def border_loops(faces: Indices, edges: Edges) -> list[Indices]:
-    """Half-edges along each loop of the border of a manifold mesh, in order; the loop of most edges first."""
-    border = np.flatnonzero(edges.opposite < 0)
-    leaving = np.full(int(faces.max()) + 1, -1, dtype=np.int64)
-    leaving[faces.ravel()[border]] = border
-    order, starts = _trace(border, leaving, faces)
-    loops = np.split(order, starts[1:])
-    return sorted(loops, key=len, reverse=True)
-
-
 def _n_loops(disc: Disc) -> int:
     """Count the loops that the border consists of."""
     return len(border_loops(disc.faces, disc.edges))
@@ -235,22 +188,6 @@ def _n_apart(ends: Indices, n_vertices: int) -> int:
     ones = np.ones(len(ends), dtype=np.int8)
     joined = coo_array((ones, (ends[:, 0], ends[:, 1])), shape=(n_vertices, n_vertices))
     return int(connected_components(joined, directed=False, return_labels=False))
-
-
-@njit(cache=True)
-def _pair(keys: Indices, order: Indices) -> tuple[Indices, int, Indices]:
-    """Give equal keys the same number, and join the half-edges that share one."""
-    of_half = np.empty(len(keys), dtype=np.int64)
-    opposite = np.full(len(keys), -1, dtype=np.int64)
-    edge = -1
-    for i in range(len(order)):
-        half = order[i]
-        if i == 0 or keys[half] != keys[order[i - 1]]:
-            edge += 1
-        else:
-            opposite[half], opposite[order[i - 1]] = order[i - 1], half
-        of_half[half] = edge
-    return of_half, edge + 1, opposite
 
 
 @njit(cache=True)
@@ -308,26 +245,6 @@ def _fans(faces: Indices, opposite: Indices, n_vertices: int) -> Indices:
                 break
             seen[half] = True
     return fans
-
-
-@njit(cache=True)
-def _trace(border: Indices, leaving: Indices, faces: Indices) -> tuple[Indices, Indices]:
-    """Border half-edges in the order in which they follow each other, and where each loop starts."""
-    order = np.empty(len(border), dtype=np.int64)
-    starts = np.empty(len(border), dtype=np.int64)
-    n, loops = 0, 0
-    for i in range(len(border)):
-        half = leaving[faces[border[i] // 3, border[i] % 3]]
-        if half < 0:
-            continue
-        starts[loops] = n
-        loops += 1
-        while half >= 0:
-            order[n] = half
-            n += 1
-            leaving[faces[half // 3, half % 3]] = -1
-            half = leaving[faces[half // 3, (half + 1) % 3]]
-    return order[:n], starts[:loops]
 
 
 @njit(cache=True)

@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from deskew.flattening.edges import Indices
 from deskew.flattening.laplace import Laplacian
-from deskew.flattening.topology import Indices
 from deskew.types import Floats
 
 

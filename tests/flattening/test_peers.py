@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from deskew.errors import InputError
+from deskew.flattening.peers import PEERS, as_mesh
+from deskew.types import Sheet, Status
+from tests.flattening.bent_meshes import arch, error_mm, folded_mesh
+from tests.flattening.bent_sheets import mirror_folds, rigid_error
+
+
+@pytest.fixture
+def igl() -> None:
+    pytest.importorskip("igl", reason="libigl is an extra")
+
+
+@pytest.mark.usefixtures("igl")
+@pytest.mark.parametrize("name", PEERS)
+def test_peers_develop_an_arch(name: str) -> None:
+    vertices, faces, flat = arch()
+    found = PEERS[name](Sheet(vertices, faces))
+    assert found.status is Status.AT_REST
+    assert 0 < error_mm(found.vertices, flat).max() < 0.05
+    assert not found.vertices[:, 2].any()
+
+
+@pytest.mark.usefixtures("igl")
+@pytest.mark.parametrize("name", PEERS)
+def test_peers_take_grids_and_keep_their_shape_and_place(name: str) -> None:
+    grid, flat = mirror_folds(3, (20, 24))
+    found = PEERS[name](Sheet(grid))
+    assert found.vertices.shape == grid.shape
+    assert 0.01 < rigid_error(found.vertices[..., :2], flat).mean() < 0.5
+    np.testing.assert_allclose(found.vertices[..., :2].mean(axis=(0, 1)), grid[..., :2].mean(axis=(0, 1)), atol=1e-9)
+
+
+@pytest.mark.usefixtures("igl")
+@pytest.mark.parametrize("name", PEERS)
+def test_coincident_vertices_make_peers_diverge_and_say_so(name: str) -> None:
+    vertices, faces, _ = folded_mesh(12)
+    vertices[30] = vertices[31]
+    found = PEERS[name](Sheet(vertices, faces))
+    assert found.status is Status.DIVERGED
+    assert "coincident" in found.remedy
+
+
+def test_cut_quads_are_left_out_of_the_mesh() -> None:
+    grid, _ = mirror_folds(3, (6, 7))
+    cut = np.zeros((5, 6), dtype=bool)
+    cut[2, 3] = True
+    assert len(as_mesh(Sheet(grid, cut=cut))[1]) == len(as_mesh(Sheet(grid))[1]) - 2
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_missing_libigl_is_one_clear_line(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "igl", None)
+    with pytest.raises(InputError, match=r"pip install 'deskew3d\[peers\]'"):
+        PEERS[name](Sheet(*folded_mesh(5)[:2]))
