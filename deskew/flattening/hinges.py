@@ -34,7 +34,7 @@ class Hinges(NamedTuple):
     ----------
     vertices : (M, 4) int array
         The edge's ends and the two far corners.
-    weights : (M, 4) array
+    stencils : (M, 4) array
         Jump of slope for a unit offset of each [1/mm].
     jumps : (M,) array
         Jump of slope without any offset.
@@ -43,7 +43,7 @@ class Hinges(NamedTuple):
     """
 
     vertices: npt.NDArray[np.int64]
-    weights: Floats
+    stencils: Floats
     jumps: Floats
     lengths: Floats
 
@@ -70,7 +70,7 @@ def hinges_of(vertices: Floats, faces: Array, directions: Floats) -> Hinges:
 
 
 def _four_corners(faces: Array, n_vertices: int) -> npt.NDArray[np.int64]:
-    """Ends of every edge that has two faces, and the corners opposite to it."""
+    """Find the ends of every edge that has two faces, and the corners opposite to it."""
     far = np.ascontiguousarray(faces, dtype=np.int64).ravel()
     start, end = faces[:, [1, 2, 0]].ravel().astype(np.int64), faces[:, [2, 0, 1]].ravel().astype(np.int64)
     low, high = np.minimum(start, end), np.maximum(start, end)
@@ -87,7 +87,7 @@ def _measure(
     directions: Floats,
     shortest: float,
     corners: Array,
-    weights: Floats,
+    stencils: Floats,
     jumps: Floats,
     lengths: Floats,
 ) -> None:
@@ -132,4 +132,4 @@ def _measure(
                 # Relative to one corner: coordinates far from the origin would cancel badly.
                 jumps[m] += coefficients[k] * (vertices[corners[m, k], axis] - vertices[i, axis]) * up[axis]
                 seen += directions[corners[m, k], axis] * up[axis]
-            weights[m, k] = coefficients[k] * seen
+            stencils[m, k] = coefficients[k] * seen

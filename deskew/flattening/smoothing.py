@@ -23,13 +23,14 @@ from deskew.flattening.directions import noise_directions
 from deskew.flattening.hinges import Hinges, hinges_of
 from deskew.types import Array, Floats
 
-STRENGTH = 0.75
-"""s above."""
-_CONVEX_PASSES, _SHARP_PASSES = 3, 6
-_CONVEX_EPS = 0.02  # [mm/mm], as every jump of slope
-_SHARP_EPS = 0.03
-_SHARP_WEIGHT = 100.0  # rho'(t) / t of the log at t = 0; k = weight * eps^2
-_RESIDUAL = 1e-3  # root mean square of the linear solver's residual, in units of sigma
+_STRENGTH = 0.75  # s above
+_CONVEX_PASSES, _SHARP_PASSES = 4, 6
+# Jumps of slope below eps are smoothed, those above are creases. Times the root of sigma over the mean edge: paper
+# bends as it does whatever the noise, but what can be told from noise grows with it.
+_CONVEX_EPS, _SHARP_EPS = 0.04, 0.06
+_SHARPNESS = 0.18  # k above, times the same root
+_REGULAR = 12  # hinges that touch an inner vertex with six neighbours
+_RESIDUAL = 0.02  # root mean square of the linear solver's residual, in units of sigma
 _MAX_ITERATIONS = 200
 
 
@@ -75,23 +76,35 @@ def smooth(hinges: Hinges, noisy: Floats, sigma_mm: float) -> Floats:
     (V,) array
         Offsets [mm].
     """
-    offsets = noisy.copy()
-    scale = STRENGTH * sigma_mm * hinges.lengths
+    root = np.sqrt(sigma_mm / float(hinges.lengths.mean()))
+    convex, sharp = (_CONVEX_EPS * root) ** 2, (_SHARP_EPS * root) ** 2
+    scale = _STRENGTH * sigma_mm * _importance(hinges, len(noisy))
     tolerance = (_RESIDUAL * sigma_mm) ** 2 * len(noisy)
+    offsets = noisy.copy()
     for n in range(_CONVEX_PASSES + _SHARP_PASSES):
-        jumps = hinges.jumps + (hinges.weights * offsets[hinges.vertices]).sum(axis=1)
+        squares = (hinges.jumps + (hinges.stencils * offsets[hinges.vertices]).sum(axis=1)) ** 2
         if n < _CONVEX_PASSES:
-            stiffness = scale / np.sqrt(jumps**2 + _CONVEX_EPS**2)
+            stiffness = scale / np.sqrt(squares + convex)
         else:
-            stiffness = scale * (_SHARP_WEIGHT * _SHARP_EPS**2) / (jumps**2 + _SHARP_EPS**2)
-        _solve(hinges.vertices, hinges.weights, hinges.jumps, stiffness, noisy, offsets, tolerance, _MAX_ITERATIONS)
+            stiffness = scale * (_SHARPNESS * root) / (squares + sharp)
+        _solve(hinges.vertices, hinges.stencils, hinges.jumps, stiffness, noisy, offsets, tolerance, _MAX_ITERATIONS)
     return offsets
+
+
+def _importance(hinges: Hinges, n_vertices: int) -> Floats:
+    """Length of each hinge's edge, more where one of its vertices has few hinges, (M,) [mm].
+
+    Three hinges do not hold a border vertex as twelve hold an inner one, and the log would leave it where noise put it.
+    """
+    hinges_at = np.bincount(hinges.vertices.ravel(), minlength=n_vertices)
+    fewest = hinges_at[hinges.vertices].min(axis=1)
+    return np.asarray(hinges.lengths * np.maximum(_REGULAR / fewest, 1.0))
 
 
 @njit(cache=True)
 def _solve(
     corners: Array,
-    weights: Floats,
+    stencils: Floats,
     jumps: Floats,
     stiffness: Floats,
     noisy: Floats,
@@ -99,7 +112,7 @@ def _solve(
     tolerance: float,
     max_iterations: int,
 ) -> int:
-    """Minimise |x - noisy|^2 + sum of stiffness (jump + weights . x)^2 by conjugate gradients, in place.
+    """Minimise |x - noisy|^2 + sum of stiffness (jump + stencil . x)^2 by conjugate gradients, in place.
 
     Jacobi-preconditioned; stops when the squared residual falls to `tolerance`. Returns the iterations.
     """
@@ -107,10 +120,10 @@ def _solve(
     for m in range(len(corners)):
         t = jumps[m]
         for k in range(4):
-            t += weights[m, k] * x[corners[m, k]]
+            t += stencils[m, k] * x[corners[m, k]]
         for k in range(4):
-            residual[corners[m, k]] -= stiffness[m] * t * weights[m, k]
-            diagonal[corners[m, k]] += stiffness[m] * weights[m, k] ** 2
+            residual[corners[m, k]] -= stiffness[m] * t * stencils[m, k]
+            diagonal[corners[m, k]] += stiffness[m] * stencils[m, k] ** 2
     direction = residual / diagonal
     image = np.empty_like(x)
     descent = 0.0
@@ -121,15 +134,15 @@ def _solve(
         for m in range(len(corners)):
             i, j, c, d = corners[m, 0], corners[m, 1], corners[m, 2], corners[m, 3]
             t = stiffness[m] * (
-                weights[m, 0] * direction[i]
-                + weights[m, 1] * direction[j]
-                + weights[m, 2] * direction[c]
-                + weights[m, 3] * direction[d]
+                stencils[m, 0] * direction[i]
+                + stencils[m, 1] * direction[j]
+                + stencils[m, 2] * direction[c]
+                + stencils[m, 3] * direction[d]
             )
-            image[i] += t * weights[m, 0]
-            image[j] += t * weights[m, 1]
-            image[c] += t * weights[m, 2]
-            image[d] += t * weights[m, 3]
+            image[i] += t * stencils[m, 0]
+            image[j] += t * stencils[m, 1]
+            image[c] += t * stencils[m, 2]
+            image[d] += t * stencils[m, 3]
         curvature = 0.0
         for v in range(len(x)):
             curvature += direction[v] * image[v]
