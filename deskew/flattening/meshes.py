@@ -13,7 +13,7 @@ Peng et al., Anderson acceleration for geometry optimization and physics simulat
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +31,8 @@ from deskew.flattening.unfolding import unfold
 from deskew.types import Flattened, Floats, Sheet, Status
 from deskew.types.arrays import require_numbers
 
+Measure = Callable[[Floats, Indices], Floats]
+
 _UNEVEN = 3.0  # ratio of stiffness beyond which Newton's method is used
 _UPSIDE_DOWN = 0.25  # a rolled sheet's projected area is never below -0.22 of its own, an overturned page's is near -1
 _FEW = 0.01  # share of faces turned over that is a local matter
@@ -42,7 +44,7 @@ def flatten_mesh(
     sheet: Sheet,
     *,
     energy: str = "arap",
-    rest: Floats | None = None,
+    rest: Floats | Measure | None = None,
     tolerance: float = 2e-7,
     max_iterations: int = 500,
 ) -> Flattened:
@@ -57,8 +59,9 @@ def flatten_mesh(
         "arap" (as rigid as possible) or "springs". On clean isometric meshes both err alike; springs do not resist
         being turned over, so that on sharp folds and irregular triangles they leave folded faces where the other
         leaves none, and take longer.
-    rest : (E,) array or None
-        Length that each edge of `edges_of(sheet.faces)` has on the flat sheet, >= 0 [mm]; None for its length now.
+    rest : (E,) array, callable or None
+        Length that each edge of `edges_of(sheet.faces)` has on the flat sheet, >= 0 [mm]; or a function that measures
+        those of the healed mesh, given its vertices (V', 3) and faces (F', 3); None for the lengths now.
     tolerance : float
         Largest change of a coordinate in a step that counts as none, as a share of the sheet's size, in (0, 0.01].
     max_iterations : int
@@ -85,7 +88,10 @@ def flatten_mesh(
     require_positive("tolerance", tolerance, 0.01)
     require_whole("max_iterations", max_iterations, 1, 1_000_000)
     disc = disc_of(sheet)
-    lengths = _lengths(disc) if rest is None else _given(rest, sheet, disc)
+    if callable(rest):
+        lengths = rest(disc.vertices, disc.faces)
+    else:
+        lengths = _lengths(disc) if rest is None else _given(rest, sheet, disc)
     faces, edges = _upright(disc)
     plate = _Plate(faces, edges, triangles(lengths, edges), len(disc.vertices))
     require(plate.shapes.n_mended < len(faces), "vertices", "span an area", "faces without area only")

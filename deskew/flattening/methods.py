@@ -11,8 +11,9 @@ import numpy as np
 from deskew.errors import DeskewError, InputError, StepError, in_one_line, require
 from deskew.flattening.dynamics import settle
 from deskew.flattening.integrators import INTEGRATORS
-from deskew.flattening.settings import ParticleSettings, StaticSettings, settings_of
-from deskew.flattening.statics import flatten_grid
+from deskew.flattening.peers import PEERS
+from deskew.flattening.settings import ParticleSettings, settings_of
+from deskew.flattening.spring import flatten_spring
 from deskew.types import Flattened, Sheet, Status
 
 Flattener = Callable[..., Flattened]
@@ -27,16 +28,23 @@ def _particles(integrator: str) -> Flattener:
     return flatten_with
 
 
-def _spring(sheet: Sheet, **settings: object) -> Flattened:
-    """Solve the springs for rest on the plane."""
-    chosen = settings_of(StaticSettings, "the static solver", settings)
-    return flatten_grid(sheet, chosen)
+def _peer(name: str) -> Flattener:
+    """Take a method of libigl as it is: it has no settings, and knows no materials."""
+
+    def flatten_with(sheet: Sheet, **settings: object) -> Flattened:
+        for setting in settings:
+            require(False, setting, f"be left out: {name} has no settings", "it")
+        require(sheet.stiffness is None, "stiffness", f"be left out: {name} knows no materials", "one")
+        return PEERS[name](sheet)
+
+    return flatten_with
 
 
 METHODS: dict[str, Flattener] = {
-    "spring": _spring,
+    "spring": flatten_spring,
     "paper_euler": _particles("euler"),
     "paper_rk4": _particles("rk4"),
+    **{name: _peer(name) for name in PEERS},
 }
 
 DEFAULT = "spring"
@@ -81,7 +89,7 @@ def flatten(sheet: Sheet, *, method: str = DEFAULT, **settings: object) -> Flatt
         The surface in the world [mm].
     method : str
         `spring` (the same springs solved for rest at once), `paper_euler` or `paper_rk4` (the paper's particle system,
-        section 3), or `package.module:function`.
+        section 3), `lscm`, `arap` or `slim` of libigl, if it is installed, or `package.module:function`.
     **settings
         Of the method: the fields of `StaticSettings` for `spring`, of `ParticleSettings` for the particle system.
 

@@ -69,7 +69,8 @@ def test_function_from_outside_plugs_in_by_its_name(plugin: str) -> None:
 )
 def test_unknown_method_lists_the_known_ones(name: Any) -> None:
     with pytest.raises(
-        InputError, match=r"`method` must be one of spring, paper_euler, paper_rk4, or package\.module:function"
+        InputError,
+        match=r"`method` must be one of spring, paper_euler, paper_rk4, lscm, arap, slim, or package\.module:function",
     ):
         flatten(Sheet(flat_grid()), method=name)
 
@@ -120,9 +121,7 @@ def test_error_of_a_function_from_outside_in_our_wording_passes(plugin: str) -> 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
 def test_unknown_setting_is_refused_by_name(method: str) -> None:
-    with pytest.raises(
-        InputError, match=r"`stifness` must be a setting of the (particle system|static solver) \(k_s, "
-    ):
+    with pytest.raises(InputError, match=r"`stifness` must be (a setting of .* \(k_s, |left out: \w+ has no settings)"):
         flatten(Sheet(flat_grid()), method=method, stifness=2.0)
 
 
