@@ -34,7 +34,7 @@ from deskew.types.arrays import require_numbers
 _UNEVEN = 3.0  # ratio of stiffness beyond which Newton's method is used
 _UPSIDE_DOWN = 0.25  # a rolled sheet's projected area is never below -0.22 of its own, an overturned page's is near -1
 _FEW = 0.01  # share of faces turned over that is a local matter
-_STIFFEN, _ROUNDS = 5.0, 4
+_STIFFEN, _ROUNDS = 5.0, 8
 _REMEDY = "smooth the surface or its noise, or cut it where it cannot lie flat"
 
 
@@ -44,7 +44,7 @@ def flatten_mesh(
     energy: str = "arap",
     rest: Floats | None = None,
     tolerance: float = 2e-7,
-    max_iterations: int = 500,
+    max_iterations: int = 300,
 ) -> Flattened:
     """Flatten a triangle mesh onto Z = 0, without folding it.
 
@@ -62,7 +62,7 @@ def flatten_mesh(
     tolerance : float
         Largest change of a coordinate in a step that counts as none, as a share of the sheet's size, in (0, 0.01].
     max_iterations : int
-        Steps after which to give up, in [1, 1e6].
+        Steps after which to give up on a start, in [1, 1e6].
 
     Returns
     -------
