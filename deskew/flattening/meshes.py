@@ -95,7 +95,7 @@ def flatten_mesh(
     found = _solve(plate, stiffness, ENERGIES[energy], step_mm, max_iterations)
     placed = np.zeros((len(disc.vertices), 3))
     placed[:, :2] = aligned(found.x, disc.vertices[:, :2])
-    counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": found.energy}
+    counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": max(found.energy, 0.0)}
     counters |= disc.counts
     counters["healed_faces"] += plate.shapes.n_mended
     counters |= {"stiffened_faces": float(found.stiffened), "converged": float(found.converged)}
