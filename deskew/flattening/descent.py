@@ -21,6 +21,8 @@ from deskew.types import Floats
 
 _RIDGE = 1e-9  # of the Laplacian's diagonal: neither moving nor turning the whole sheet costs anything
 _SHORTEST_STEP = 1e-6
+_PATIENCE = 300  # local and global steps after which Newton's method may have a try
+_LAST_STEPS = 20
 
 
 class Descent(NamedTuple):
@@ -57,11 +59,18 @@ def minimise(
     step_mm : float
         Largest change of a coordinate that counts as none [mm].
     max_iterations : int
-        Steps after which to give up.
+        Steps after which to give up; from 300 on, Newton's method may add 20.
     uneven : bool
         Whether the stiffness varies so strongly that only Newton's method will do.
     """
-    return (newton if uneven else local_global)(model, system, start, step_mm, max_iterations)
+    if uneven:
+        return newton(model, system, start, step_mm, max_iterations)
+    found = local_global(model, system, start, step_mm, max_iterations)
+    if found.converged or max_iterations < _PATIENCE or not np.isfinite(found.x).all():
+        return found
+    # Parts that are squeezed keep the steps circling; a line search does not circle.
+    last = newton(model, system, found.x, step_mm, _LAST_STEPS)
+    return last._replace(n_iterations=found.n_iterations + last.n_iterations)
 
 
 def local_global(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> Descent:

@@ -36,7 +36,7 @@ Measure = Callable[[Floats, Indices], Floats]
 _UNEVEN = 3.0  # ratio of stiffness beyond which Newton's method is used
 _UPSIDE_DOWN = 0.25  # a rolled sheet's projected area is never below -0.22 of its own, an overturned page's is near -1
 _FEW = 0.01  # share of faces turned over that is a local matter
-_STIFFEN, _ROUNDS = 5.0, 4
+_STIFFEN, _ROUNDS = 5.0, 8
 _REMEDY = "smooth the surface or its noise, or cut it where it cannot lie flat"
 
 
@@ -46,7 +46,7 @@ def flatten_mesh(
     energy: str = "arap",
     rest: Floats | Measure | None = None,
     tolerance: float = 2e-7,
-    max_iterations: int = 500,
+    max_iterations: int = 300,
 ) -> Flattened:
     """Flatten a triangle mesh onto Z = 0, without folding it.
 
@@ -65,7 +65,7 @@ def flatten_mesh(
     tolerance : float
         Largest change of a coordinate in a step that counts as none, as a share of the sheet's size, in (0, 0.01].
     max_iterations : int
-        Steps after which to give up, in [1, 1e6].
+        Steps after which to give up on a start, in [1, 1e6].
 
     Returns
     -------
@@ -101,7 +101,7 @@ def flatten_mesh(
     found = _solve(plate, stiffness, ENERGIES[energy], step_mm, max_iterations)
     placed = np.zeros((len(disc.vertices), 3))
     placed[:, :2] = aligned(found.x, disc.vertices[:, :2])
-    counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": found.energy}
+    counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": max(found.energy, 0.0)}
     counters |= disc.counts
     counters["healed_faces"] += plate.shapes.n_mended
     counters |= {"stiffened_faces": float(found.stiffened), "converged": float(found.converged)}

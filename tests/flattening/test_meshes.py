@@ -212,6 +212,38 @@ def test_surface_that_cannot_lie_flat_is_spread_without_folds() -> None:
     assert found.counters["energy"] > 1
 
 
+@pytest.mark.parametrize("energy", ["arap", "springs"])
+def test_tube_is_spread_to_a_ring_by_a_start_in_reserve(energy: str) -> None:
+    """Every edge of a tube can be unrolled along one direction, which lays its far side over its near one."""
+    around, down = np.meshgrid(np.linspace(0, 2 * np.pi, 40), np.linspace(0, -10, 6))
+    grid = np.stack([30 * np.cos(around), 30 * np.sin(around), down], axis=-1)
+    vertices, faces, _ = meshed(grid, grid[..., :2])
+    faces = np.where(faces % 40 == 39, faces - 39, faces)
+    found = flatten_mesh(Sheet(vertices, faces), energy=energy)
+    assert found.status is Status.AT_REST
+    areas = signed_areas(found.vertices[:, :2], faces)
+    assert (areas > 0).all() or (areas < 0).all()
+    assert np.ptp(found.vertices[:, 0]) == pytest.approx(np.ptp(found.vertices[:, 1]), rel=0.05)
+
+
+def test_faces_that_turn_over_are_stiffened_until_they_lie_right() -> None:
+    vertices, faces, flat = irregular_fold(250, 10)
+    found = flatten_mesh(Sheet(vertices, faces), energy="springs")
+    assert found.counters["stiffened_faces"] > 0
+    assert found.counters["flips"] == 0
+    assert signed_areas(found.vertices[:, :2], faces).min() > 0
+    assert 0.1 < error_mm(found.vertices, flat, faces).mean() < 0.6
+
+
+def test_turned_over_faces_are_told_with_a_remedy() -> None:
+    vertices = V.copy()
+    vertices[300] = vertices[40]  # a spike right across the page
+    found = flatten_mesh(Sheet(vertices, F))
+    assert found.status is Status.FOLDED
+    assert found.counters["flips"] >= 1
+    assert found.remedy.startswith(f"{found.counters['flips']:.0f} faces are turned over")
+
+
 def test_too_few_steps_are_a_result_with_a_remedy() -> None:
     found = flatten_mesh(Sheet(V, F), max_iterations=1)
     assert found.status is Status.LOCKED
