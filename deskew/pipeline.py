@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ from deskew.acquisition import DecoderSettings, DenoiseSettings, DepthSettings, 
 from deskew.errors import StepError, require
 from deskew.io import StiffnessMap
 from deskew.projection import project
+from deskew.recipes import Recipe
 from deskew.restoration import Textures
 from deskew.types import (
     WHITE,
@@ -29,50 +30,28 @@ from deskew.types import (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Recipe:
-    """How a page is scanned for a flattening method.
-
-    Attributes
-    ----------
-    mode : str
-        How a line sweep is read, "spatial" (section 2.3: a curve a frame) or "temporal" (a pixel by itself).
-    ink : bool
-        Whether what ink does to the decoded coordinates is taken out.
-    denoise : bool
-        Whether the depth map is filtered.
-    """
-
-    mode: str
-    ink: bool
-    denoise: bool
-
-    def decoder(self, pattern: PatternKind) -> DecoderSettings | None:
-        """Return the settings of a pattern's decoder; None for its own."""
-        if pattern is PatternKind.LINE_SWEEP:
-            return SweepSettings(mode=self.mode)
-        return acquisition.settings_for_ink(pattern) if self.ink else None
+def decoder_for(recipe: Recipe, pattern: PatternKind) -> DecoderSettings | None:
+    """Return the settings of a pattern's decoder that a recipe asks for; None for its own."""
+    if pattern is PatternKind.LINE_SWEEP:
+        return SweepSettings(mode=recipe.mode)
+    return acquisition.settings_for_ink(pattern) if recipe.ink else None
 
 
-PAPER_RECIPE = Recipe("spatial", ink=False, denoise=False)
-"""As the paper scans: no ink correction, no filter."""
-
-BEST_RECIPE = Recipe("temporal", ink=True, denoise=True)
-"""What serves rest lengths along the surface."""
-
-
-def recipe_for(method: str) -> Recipe:
-    """Return the recipe that belongs to a flattening method: the paper's to the paper's methods, else the best."""
-    return PAPER_RECIPE if method.startswith("paper_") else BEST_RECIPE
-
-
-def scan_by(recipe: Recipe, capture: Capture, calibration: Calibration, *, shape: tuple[int, int] = (45, 45)) -> Scan:
-    """Scan a page by a recipe; see :func:`scan`."""
+def scan_by(
+    recipe: Recipe,
+    capture: Capture,
+    calibration: Calibration,
+    *,
+    shape: tuple[int, int] = (45, 45),
+    mask: npt.NDArray[np.bool_] | None = None,
+) -> Scan:
+    """Scan a page by a recipe; see :func:`scan` for the rest."""
     return scan(
         capture,
         calibration,
         shape=shape,
-        settings=recipe.decoder(capture.pattern),
+        mask=mask,
+        settings=decoder_for(recipe, capture.pattern),
         ink=InkSettings() if recipe.ink else None,
         denoise=DenoiseSettings() if recipe.denoise else None,
     )

@@ -16,11 +16,23 @@ Mask = Annotated[
     Path | None,
     typer.Option("--mask", metavar="IMAGE", help="The page in the camera's picture, not black; found if not given."),
 ]
-Ink = Annotated[bool, typer.Option("--ink", help="Take out what ink does to the depth; the paper does not.")]
-Denoise = Annotated[
-    bool, typer.Option("--denoise", help="Filter the depth, its creases kept; use with --ink on a printed page.")
+Ink = Annotated[
+    bool | None,
+    typer.Option("--ink/--no-ink", help="Take out what ink does to the depth. Done unless the method is the paper's."),
 ]
-Method = Annotated[str, typer.Option("--method", "-m", help="Flattening method.")]
+Denoise = Annotated[
+    bool | None,
+    typer.Option("--denoise/--no-denoise", help="Filter the depth, its creases kept. Done unless as above."),
+]
+Method = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        "-m",
+        help="spring (the best), paper_euler or paper_rk4 (the paper's), lscm, arap or slim (libigl's), "
+        "or package.module:function.",
+    ),
+]
 Lights = Annotated[
     list[str] | None,
     typer.Option("--light", "-l", metavar="NAME", help="Light to restore; may be repeated. White unless any is named."),

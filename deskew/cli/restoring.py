@@ -25,6 +25,7 @@ from deskew.cli.options import (
 from deskew.cli.pictures import PICTURES, Wanted, write_pictures
 from deskew.cli.printing import flattened_figures, projector_figures, report
 from deskew.cli.scanning import Scanning, scan_page
+from deskew.recipes import recipe_for
 
 if TYPE_CHECKING:
     from deskew.types import Scan
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 def restore(
     scan_file: Annotated[Path, typer.Argument(metavar="SCAN", help="scan.npz from `deskew scan`.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
-    method: Method = "paper_euler",
+    method: Method = "spring",
     stiffness: Stiffness = None,
     lights: Lights = None,
     combine: Combine = None,
@@ -66,12 +67,12 @@ def run(
     capture: CaptureFolder,
     calibration: CalibrationFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
-    method: Method = "paper_euler",
+    method: Method = "spring",
     stiffness: Stiffness = None,
     shape: Shape = (45, 45),
     mask: Mask = None,
-    ink: Ink = False,
-    denoise: Denoise = False,
+    ink: Ink = None,
+    denoise: Denoise = None,
     lights: Lights = None,
     combine: Combine = None,
     scale: Scale = 1.0,
@@ -90,7 +91,7 @@ def run(
     io.require_writable(output, PICTURES)
     require_method(method)
     wanted = Wanted.of(output, lights, combine, scale)
-    how = Scanning(shape, mask, ink, denoise, stiffness)
+    how = Scanning.asked(shape, mask, recipe_for(method), ink, denoise, stiffness)
     restore_page(scan_page(capture, io.read_calibration(calibration), how, wanted), method, wanted, as_json)
 
 

@@ -14,6 +14,7 @@ from deskew.cli.options import CalibrationFile, CaptureFolder, Denoise, Ink, Jso
 from deskew.cli.pictures import Wanted
 from deskew.cli.printing import depth_figures, projector_figures, report, warn
 from deskew.errors import require
+from deskew.recipes import BEST, Recipe
 
 if TYPE_CHECKING:
     from deskew.io import StiffnessMap
@@ -65,9 +66,22 @@ class Scanning:
 
     shape: tuple[int, int]
     mask: Path | None
-    ink: bool
-    denoise: bool
+    recipe: Recipe
     stiffness: Path | None = None
+
+    @classmethod
+    def asked(
+        cls,
+        shape: tuple[int, int],
+        mask: Path | None,
+        own: Recipe,
+        ink: bool | None,
+        denoise: bool | None,
+        stiffness: Path | None = None,
+    ) -> Scanning:
+        """Scan by the `own` recipe of a method, but for what the user says."""
+        ink, denoise = own.ink if ink is None else ink, own.denoise if denoise is None else denoise
+        return cls(shape, mask, replace(own, ink=ink, denoise=denoise), stiffness)
 
     def page(self, size: tuple[int, int]) -> Array | None:
         """Read the mask, (height, width) bool."""
@@ -101,16 +115,9 @@ def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wan
 
         wanted.check([WHITE, *capture.textures])
     mask, materials = how.page(capture.camera_size), how.materials(capture.camera_size)
-    from deskew import acquisition, pipeline
+    from deskew import pipeline
 
-    found = pipeline.scan(
-        capture,
-        calibration,
-        shape=how.shape,
-        mask=mask,
-        ink=acquisition.InkSettings() if how.ink else None,
-        denoise=acquisition.DenoiseSettings() if how.denoise else None,
-    )
+    found = pipeline.scan_by(how.recipe, capture, calibration, shape=how.shape, mask=mask)
     warn(found.projector, folder.name)
     return found if materials is None else pipeline.with_stiffness(found, materials)
 
@@ -152,20 +159,21 @@ def scan(
     output: Annotated[Path, typer.Option("--output", "-o", help="scan.npz (everything) or scan.ply (the mesh).")],
     shape: Shape = (45, 45),
     mask: Mask = None,
-    ink: Ink = False,
-    denoise: Denoise = False,
+    ink: Ink = None,
+    denoise: Denoise = None,
     as_json: Json = False,
 ) -> None:
     """Measure the page's 3D shape: depth map and mesh, in millimetres.
 
-    A PLY carries texture coordinates into the raw white image; `deskew restore` needs the NPZ.
+    A PLY carries texture coordinates into the raw white image; `deskew restore` needs the NPZ. For the paper's methods
+    scan as the paper does: --no-ink --no-denoise.
 
     Example: deskew scan page/ --calibration calibration.json -o scan.npz
     """
     from deskew import io, projection
 
     io.require_writable(output, (".npz", ".ply"))
-    found = scan_page(capture, io.read_calibration(calibration), Scanning(shape, mask, ink, denoise))
+    found = scan_page(capture, io.read_calibration(calibration), Scanning.asked(shape, mask, BEST, ink, denoise))
     if output.suffix.lower() == ".npz":
         io.write_scan(found, output)
     else:

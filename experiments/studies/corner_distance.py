@@ -12,7 +12,7 @@ import data_synth
 from data_synth import Checkerboard, TrueSheet, Truth
 from deskew import acquisition, metrics, pipeline, restoration
 from deskew.errors import require
-from deskew.pipeline import Recipe
+from deskew.recipes import Recipe
 from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan
 from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config

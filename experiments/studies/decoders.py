@@ -145,7 +145,7 @@ def _depth_figures(
     rig = Rig(bench.rig.camera, bench.rig.projector, replace(bench.rig.config, exposures=plan.exposures))
     capture, truth = data_synth.render(rig, sheet, page, rng, plan.pattern, plan.fringes)
     how = configured(config.scan)
-    decoded = pipeline.decode(capture, how.decoder(plan.pattern))
+    decoded = pipeline.decode(capture, pipeline.decoder_for(how, plan.pattern))
     if how.ink:
         decoded = acquisition.correct_ink(bench.calibration, decoded, capture)
     true_points = truth.points_at(restoration.undistortion_map(bench.calibration.camera).astype(np.float64))

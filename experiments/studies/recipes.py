@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from deskew.pipeline import PAPER_RECIPE, Recipe, recipe_for
+from deskew.recipes import PAPER, Recipe, recipe_for
 from experiments.settings import Config, ScanSettings
 
 
-def configured(settings: ScanSettings, own: Recipe = PAPER_RECIPE) -> Recipe:
+def configured(settings: ScanSettings, own: Recipe = PAPER) -> Recipe:
     """Return `own` with whatever the configuration sets in its place."""
     return Recipe(
         own.mode if settings.mode is None else settings.mode,

@@ -11,7 +11,7 @@ import data_synth
 from data_synth import BallPlate, Checkerboard, Page, Truth
 from deskew import acquisition, metrics, pipeline, restoration
 from deskew.acquisition import DepthSettings
-from deskew.pipeline import Recipe
+from deskew.recipes import Recipe
 from deskew.types import Calibration, Capture, Correspondence, DepthMap, Floats
 from experiments.studies.bench import Bench
 from experiments.studies.scanned import scanned_points
@@ -72,7 +72,7 @@ def photographed(
     balls = body if isinstance(body, BallPlate) else None
     sheet = body.sheet if isinstance(body, BallPlate) else body
     capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-    correspondence = pipeline.decode(capture, settings=scan.decoder(capture.pattern))
+    correspondence = pipeline.decode(capture, settings=pipeline.decoder_for(scan, capture.pattern))
     if scan.ink:
         correspondence = acquisition.correct_ink(bench.calibration, correspondence, capture)
     return Target(page, balls, capture, truth, correspondence)
