@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from deskew.cli.options import Json, Method, Stiffness
-from deskew.cli.printing import flattened_figures, report
+from deskew.cli.printing import flattened_figures, report, say
 from deskew.errors import StepError, require
 
 if TYPE_CHECKING:
@@ -28,7 +28,6 @@ Noise = Annotated[
     typer.Option("--noise", metavar="auto|MM", help="Scanner noise to remove; auto, the default, estimates it."),
 ]
 Voxel = Annotated[float | None, typer.Option("--voxel", metavar="MM", help="Edge of a tifxyz folder's voxels [mm].")]
-Largest = Annotated[bool, typer.Option("--largest", help="Of a tifxyz folder in several pieces take the largest.")]
 
 
 def flatten(
@@ -38,13 +37,13 @@ def flatten(
     stiffness: Stiffness = None,
     noise: Noise = None,
     voxel: Voxel = None,
-    largest: Largest = False,
     as_json: Json = False,
 ) -> None:
     """Flatten a mesh from any scanner: the same vertices and faces, in their order, on the plane z = 0.
 
     The mesh is one piece with a border; holes and overhangs are welcome. Its texture coordinates are kept, and a
-    stiffness map is looked up by them (0 to 1, from the picture's lower left corner).
+    stiffness map is looked up by them (0 to 1, from the picture's lower left corner). Of a tifxyz folder in several
+    pieces the largest is taken, and it is said how much that leaves out.
 
     Example: deskew flatten page.obj -o flat.ply --noise auto
 
@@ -55,7 +54,7 @@ def flatten(
     io.require_writable(output, io.MESH_SUFFIXES)
     settings = _settings(method, noise)
     require_method(method)
-    mesh = _read(surface, voxel, largest)
+    mesh = _read(surface, voxel)
     constants: Floats | None = None
     if stiffness is not None:
         require(mesh.texture is not None, str(surface), "have texture coordinates for a stiffness map", "none")
@@ -94,14 +93,19 @@ def _settings(method: str, noise: str | None) -> dict[str, float | str]:
     return {"noise_mm": level}
 
 
-def _read(surface: Path, voxel: float | None, largest: bool) -> Mesh:
+def _read(surface: Path, voxel: float | None) -> Mesh:
     """Read a mesh, or a folder whose voxels have a size."""
     from deskew import io
 
     if surface.is_dir():
         if voxel is None:
             require(False, "--voxel", "be given for a tifxyz folder, which does not say its voxels' size", "none")
-        return io.read_tifxyz(surface, float(voxel or 0.0), largest=largest)
+        segment = io.read_tifxyz(surface, float(voxel or 0.0))
+        if segment.quads_left_out:
+            say(
+                f"warning: {surface} holds {segment.n_pieces} pieces; the largest is flattened, and "
+                f"{segment.quads_left_out} quads of the others are left out."
+            )
+        return segment.mesh
     require(voxel is None, "--voxel", f"be left out for a mesh in mm such as {surface}", voxel)
-    require(not largest, "--largest", f"be left out for a mesh such as {surface}", "it")
     return io.read_mesh(surface)

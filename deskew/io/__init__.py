@@ -13,11 +13,12 @@ from deskew.io.images import read_image, write_image
 from deskew.io.meshes import MESH_SUFFIXES, Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
 from deskew.io.scans import read_depth, read_depth_image, read_scan, write_depth, write_scan
 from deskew.io.stiffness import StiffnessMap, face_stiffness, read_stiffness
-from deskew.io.tifxyz import read_tifxyz
+from deskew.io.tifxyz import Segment, read_tifxyz
 
 __all__ = [
     "MESH_SUFFIXES",
     "Mesh",
+    "Segment",
     "StiffnessMap",
     "face_stiffness",
     "grid_faces",

@@ -7,11 +7,12 @@ grid has a hole; `meta.json` says what else is known. None of it says how large 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from deskew.errors import InputError, require, require_positive
+from deskew.errors import require, require_positive
 from deskew.io.files import read_json, require_file, require_folder
 from deskew.io.meshes import Mesh, grid_faces
 from deskew.io.scans import read_depth_image
@@ -44,8 +45,26 @@ def _pieces(quads: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.int32], int]:
     return pieces, int(n)
 
 
-def read_tifxyz(folder: Path, voxel_mm: float, *, largest: bool = False) -> Mesh:
-    """Read a tifxyz folder as a triangle mesh.
+class Segment(NamedTuple):
+    """A surface in a volume.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Its largest connected piece [mm].
+    n_pieces : int
+        Pieces that the folder holds.
+    quads_left_out : int
+        Valid quads of all other pieces.
+    """
+
+    mesh: Mesh
+    n_pieces: int
+    quads_left_out: int
+
+
+def read_tifxyz(folder: Path, voxel_mm: float) -> Segment:
+    """Read a tifxyz folder as a triangle mesh; of several pieces, the largest.
 
     Parameters
     ----------
@@ -53,12 +72,10 @@ def read_tifxyz(folder: Path, voxel_mm: float, *, largest: bool = False) -> Mesh
         With `x.tif`, `y.tif` and `z.tif`.
     voxel_mm : float
         Edge of a voxel [mm], in (0, 10]; the folder does not say it.
-    largest : bool
-        Of several pieces take the largest; otherwise they are refused.
 
     Returns
     -------
-    Mesh
+    Segment
         Two triangles for each quad of the grid with four valid corners; vertices [mm] row by row, those that no quad
         uses left out. The texture coordinate of row r, column c of an R x C grid is ``((c + 0.5) / C,
         1 - (r + 0.5) / R)``, the middle of that pixel in a picture of the grid's size.
@@ -66,8 +83,7 @@ def read_tifxyz(folder: Path, voxel_mm: float, *, largest: bool = False) -> Mesh
     Raises
     ------
     InputError
-        If a file is missing or damaged, the sizes differ, a coordinate is not finite, no quad is valid, or there are
-        several pieces.
+        If a file is missing or damaged, the sizes differ, a coordinate is not finite, or no quad is valid.
     """
     folder = Path(folder)
     require_positive("voxel", voxel_mm, 10.0, "mm")
@@ -81,14 +97,11 @@ def read_tifxyz(folder: Path, voxel_mm: float, *, largest: bool = False) -> Mesh
     quads = valid[:-1, :-1] & valid[:-1, 1:] & valid[1:, :-1] & valid[1:, 1:]
     require(bool(quads.any()), str(folder), "hold a quad of four valid points", f"{int(valid.sum())} points, no quad")
     pieces, n_pieces = _pieces(quads)
-    if n_pieces > 1:
-        sizes = np.bincount(pieces.ravel())[1:]
-        found = f"{n_pieces} pieces of {', '.join(map(str, sorted(sizes.tolist(), reverse=True)[:8]))} quads"
-        if not largest:
-            raise InputError(f"`{folder}` must be one connected piece, got {found}; ask for the `largest` alone.")
-        quads = pieces == 1 + int(sizes.argmax())
+    whole = int(quads.sum())
+    quads = pieces == 1 + int(np.bincount(pieces.ravel())[1:].argmax())
     faces = grid_faces(rows, columns).reshape(-1, 2, 3)[quads.ravel()].reshape(-1, 3)
     used, compact = np.unique(faces, return_inverse=True)
     row, column = np.divmod(used, columns)
     texture = np.column_stack([(column + 0.5) / columns, 1.0 - (row + 0.5) / rows])
-    return Mesh(voxel_mm * grid.reshape(-1, 3)[used], compact.reshape(-1, 3).astype(np.int64), texture)
+    mesh = Mesh(voxel_mm * grid.reshape(-1, 3)[used], compact.reshape(-1, 3).astype(np.int64), texture)
+    return Segment(mesh, n_pieces, whole - int(quads.sum()))

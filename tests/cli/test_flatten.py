@@ -86,15 +86,14 @@ def test_a_tifxyz_folder_is_scaled_by_its_voxels(here: Path, deskew: Command, pa
     assert np.array_equal(found.faces, page.faces)
 
 
-def test_of_a_folder_in_pieces_the_largest_is_taken_on_request(here: Path, deskew: Command) -> None:
+def test_of_a_folder_in_pieces_the_largest_is_taken_and_it_is_said(here: Path, deskew: Command) -> None:
     x = cv2.imread(str(here / "segment/x.tif"), cv2.IMREAD_UNCHANGED)
     x[:, 4] = -1.0
     cv2.imwrite(str(here / "segment/x.tif"), x)
     line = "flatten segment -o out/flat.ply --voxel 0.5 -m own:press"
-    code, out, err = deskew(line)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "must be one connected piece, got 2 pieces of 90, 18 quads; ask for the `largest` alone." in err
-    assert deskew(f"{line} --largest")[0] == 0
+    code, _, err = deskew(line)
+    assert (code, err.count("\n")) == (0, 1)
+    assert "holds 2 pieces; the largest is flattened, and 18 quads of the others are left out." in err
     assert len(read_mesh(here / "out" / "flat.ply").vertices) == 7 * 16
 
 
@@ -175,7 +174,6 @@ WRONG = {
         "flatten page.obj -o out/f.ply -m own:press --voxel 1",
         "`--voxel` must be left out",
     ),
-    "piece of a mesh": ("flatten page.obj -o out/f.ply -m own:press --largest", "`--largest` must be left out"),
     "no tifxyz": ("flatten out -o out/f.ply -m own:press --voxel 1", "`out/x.tif` must be a file, got nothing there"),
     "stiffness without texture": (
         "flatten bare.obj -o out/f.ply -m own:press --stiffness m.png",
