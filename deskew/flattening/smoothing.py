@@ -28,7 +28,7 @@ _CONVEX_PASSES, _SHARP_PASSES = 4, 6
 # Jumps of slope below eps are smoothed, those above are creases. Times the root of sigma over the mean edge: paper
 # bends as it does whatever the noise, but what can be told from noise grows with it.
 _CONVEX_EPS, _SHARP_EPS = 0.04, 0.06
-_SHARPNESS = 0.18  # k above, times the same root
+_SHARPNESS = 0.125  # k above, times the same root
 _REGULAR = 12  # hinges that touch an inner vertex with six neighbours
 _RESIDUAL = 0.02  # root mean square of the linear solver's residual, in units of sigma
 _MAX_ITERATIONS = 200

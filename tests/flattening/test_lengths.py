@@ -5,6 +5,7 @@ import pytest
 
 from deskew.errors import InputError
 from deskew.flattening.lengths import surface_lengths
+from deskew.flattening.noiselevel import noise_level
 from tests.flattening.noisy_sheets import SHEETS, noisy, roof, scroll
 
 
@@ -53,9 +54,11 @@ def test_curvature_is_no_crease():
 @pytest.mark.parametrize("name", SHEETS)
 def test_noise_leaves_the_mean_length_unbiased(name):
     vertices, faces, flat = SHEETS[name]()
-    found, chords = strains(noisy(vertices), faces, flat, 0.3)
+    both = [strains(noisy(vertices, seed=seed), faces, flat, 0.3) for seed in (11, 12, 13)]
+    found, chords = np.mean(both, axis=0)
     assert chords.mean() > 0.02
-    assert abs(found.mean()) < 1e-3
+    # Without the bootstrap the arch and the folds come out 3.5e-4 short, without unfolding the roof and the folds 5e-4.
+    assert abs(found.mean()) < 2.2e-4
     assert 0.001 < found.std() < 0.03
 
 
@@ -115,6 +118,17 @@ def test_a_hole_changes_lengths_at_its_rim_only():
     far = np.abs(holed[:, 0] // 84 - 25) > 15
     assert change[far].max() < 2e-3
     assert change.max() < 0.3
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.3])
+def test_coincident_vertices_and_needles_are_borne(sigma):
+    vertices, faces, _ = SHEETS["arch"]()
+    scan = noisy(vertices, sigma)
+    scan[1000], scan[2000] = scan[1001], (scan[2001] + scan[1917]) / 2
+    edges, lengths = surface_lengths(scan, faces, sigma)
+    assert np.isfinite(lengths).all()
+    assert lengths[(edges == [1000, 1001]).all(axis=1)] < 0.15
+    assert 0.97 * sigma <= noise_level(scan, faces) <= 1.03 * sigma + 3e-4
 
 
 @pytest.mark.parametrize("sigma", [-1.0, np.inf, np.nan])
