@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from deskew.errors import require
 from deskew.flattening.directions import noise_directions
 from deskew.flattening.hinges import Hinges, hinges_of
 from deskew.types import Array, Floats
@@ -50,8 +51,14 @@ def denoise(vertices: Floats, faces: Array, sigma_mm: float) -> Floats:
     -------
     (V, 3) array
         Positions [mm], moved along :func:`deskew.flattening.directions.noise_directions` alone.
+
+    Raises
+    ------
+    InputError
+        If `sigma_mm` is negative or not finite.
     """
-    if sigma_mm <= 0.0:
+    require(0.0 <= sigma_mm < np.inf, "sigma_mm", "be finite and not negative [mm]", sigma_mm)
+    if sigma_mm == 0.0:
         return np.array(vertices, dtype=np.float64)
     directions = noise_directions(vertices, faces)
     hinges = hinges_of(vertices, faces, directions)
