@@ -7,9 +7,9 @@ and the two lines,
     length = c (sin a + sin b) / sin(a + b).
 
 The lines are taken from the triangles behind the edge's ends, which lie on their own sides of the crease. A curved
-sheet turns everywhere, and its chords are good already; so of the turning at an end, only what exceeds the turning one
-step further back counts as a crease (the smaller of both, of one sign, is curvature), as in essentially non-oscillatory
-schemes with subcell resolution. Without a crease the angles vanish, and the length is the chord.
+sheet turns everywhere, and its chords are good already; so of the turning at an end, only what exceeds 1.5 times the
+turning one step further back counts as a crease, in the spirit of essentially non-oscillatory schemes with subcell
+resolution. Without a crease the angles vanish, and the length is the chord.
 
 References
 ----------
@@ -30,8 +30,11 @@ Indices = npt.NDArray[np.int64]
 
 # The bearing behind an end may miss its fan of triangles by this share: a border is never quite straight.
 _MISS = 0.2
-# A corner may not turn by more [rad]: what is steeper is a wall that the mesh does not resolve.
-_SHARPEST = 1.4
+# A crease counts as turning by no more [rad]: at pi the formula has no end, and what is sharper is a wall between two
+# samples, of which nothing is known.
+_SHARPEST = 2.0
+# Turning that changes by no more than this factor from vertex to vertex is curvature.
+_CURVATURE = 1.5
 
 
 class Rays(NamedTuple):
@@ -107,7 +110,7 @@ def crease_lengths(vertices: Floats, rays: Rays) -> Floats:
     turns = np.zeros(2 * len(rays.edges))
     _turns(vertices, *rays, turns)
     a, b = rays.edges.T
-    lengths = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    lengths: Floats = np.linalg.norm(vertices[a] - vertices[b], axis=1)
     _unfold(turns, rays.behind, rays.shares, rays.before, lengths)
     return lengths
 
@@ -200,8 +203,10 @@ def _unfold(turns: Floats, behind: Indices, shares: Floats, before: Indices, len
             if behind[half, 0] >= 0 and total > 0.0:
                 prior = (shares[half, 0] * turns[before[half, 0]] + shares[half, 1] * turns[before[half, 1]]) / total
             if prior * turn > 0.0:
-                turn -= np.sign(turn) * min(abs(turn), abs(prior))
+                turn -= np.sign(turn) * min(abs(turn), _CURVATURE * abs(prior))
             excess[side] = turn
         a, b = abs(excess[0]), abs(excess[1])
-        if excess[0] * excess[1] > 0.0 and a + b < _SHARPEST:
+        if excess[0] * excess[1] > 0.0:
+            blunted = min(1.0, _SHARPEST / (a + b))
+            a, b = a * blunted, b * blunted
             lengths[edge] *= (np.sin(a) + np.sin(b)) / np.sin(a + b)

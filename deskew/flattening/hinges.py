@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from deskew.types import Array, Floats
 
@@ -61,12 +60,24 @@ def hinges_of(vertices: Floats, faces: Array, directions: Floats) -> Hinges:
         Unit vectors along which the vertices may move.
     """
     corners = _four_corners(faces, len(vertices))
-    edges = vertices[corners[:, 1]] - vertices[corners[:, 0]]
-    shortest = _LEAST_ALTITUDE * float(np.linalg.norm(edges, axis=1).mean()) if len(corners) else 0.0
-    n = len(corners)
-    found = Hinges(corners, np.empty((n, 4)), np.empty(n), np.empty(n))
-    _measure(vertices, np.ascontiguousarray(directions), shortest, *found)
-    return found
+    # Relative to one corner: coordinates far from the origin would cancel badly.
+    arms = vertices[corners[:, 1:]] - vertices[corners[:, :1]]
+    mean_edge = float(np.linalg.norm(arms[:, 0], axis=1).mean()) if len(corners) else 0.0
+    shortest = max(_LEAST_ALTITUDE * mean_edge, 1e-300)
+    ups = directions[corners]
+    up = ups.sum(axis=1)
+    up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
+    rises = np.einsum("mkx,mx->mk", arms, up)
+    flat = arms - rises[:, :, None] * up[:, None]
+    edges, far = flat[:, 0], flat[:, 1:]
+    lengths = np.maximum(np.linalg.norm(edges, axis=1), shortest)
+    along = np.einsum("mkx,mx->mk", far, edges) / lengths[:, None] ** 2
+    altitudes = np.linalg.norm(far - along[:, :, None] * edges[:, None], axis=2)
+    slopes = 1.0 / np.maximum(altitudes, shortest)
+    stencils = np.column_stack([((along - 1.0) * slopes).sum(axis=1), -(along * slopes).sum(axis=1), slopes])
+    jumps = np.einsum("mk,mk->m", stencils[:, 1:], rises)
+    stencils *= np.einsum("mkx,mx->mk", ups, up)
+    return Hinges(corners, stencils, jumps, lengths)
 
 
 def _four_corners(faces: Array, n_vertices: int) -> npt.NDArray[np.int64]:
@@ -79,57 +90,3 @@ def _four_corners(faces: Array, n_vertices: int) -> npt.NDArray[np.int64]:
     first = np.flatnonzero(keys[order][1:] == keys[order][:-1])
     one, other = order[first], order[first + 1]
     return np.stack([low[one], high[one], far[one], far[other]], axis=1)
-
-
-@njit(cache=True)
-def _measure(
-    vertices: Floats,
-    directions: Floats,
-    shortest: float,
-    corners: Array,
-    stencils: Floats,
-    jumps: Floats,
-    lengths: Floats,
-) -> None:
-    """Fill the stencils; every hinge is seen along the mean direction of its four corners."""
-    up, edge, arm, coefficients = np.empty(3), np.empty(3), np.empty(3), np.empty(4)
-    for m in range(len(corners)):
-        i, j = corners[m, 0], corners[m, 1]
-        size = 0.0
-        for axis in range(3):
-            up[axis] = 0.0
-            for k in range(4):
-                up[axis] += directions[corners[m, k], axis]
-            size += up[axis] ** 2
-        rise = 0.0
-        for axis in range(3):
-            up[axis] /= np.sqrt(size) if size > 0.0 else 1.0
-            edge[axis] = vertices[j, axis] - vertices[i, axis]
-            rise += edge[axis] * up[axis]
-        square = 0.0
-        for axis in range(3):
-            edge[axis] -= rise * up[axis]
-            square += edge[axis] ** 2
-        square = max(square, shortest**2)
-        coefficients[0] = coefficients[1] = 0.0
-        for k in range(2, 4):
-            rise, along = 0.0, 0.0
-            for axis in range(3):
-                arm[axis] = vertices[corners[m, k], axis] - vertices[i, axis]
-                rise += arm[axis] * up[axis]
-                along += arm[axis] * edge[axis]
-            along /= square
-            altitude = 0.0
-            for axis in range(3):
-                altitude += (arm[axis] - rise * up[axis] - along * edge[axis]) ** 2
-            coefficients[k] = 1.0 / max(np.sqrt(altitude), shortest)
-            coefficients[0] -= (1.0 - along) * coefficients[k]
-            coefficients[1] -= along * coefficients[k]
-        jumps[m], lengths[m] = 0.0, np.sqrt(square)
-        for k in range(4):
-            seen = 0.0
-            for axis in range(3):
-                # Relative to one corner: coordinates far from the origin would cancel badly.
-                jumps[m] += coefficients[k] * (vertices[corners[m, k], axis] - vertices[i, axis]) * up[axis]
-                seen += directions[corners[m, k], axis] * up[axis]
-            stencils[m, k] = coefficients[k] * seen

@@ -4,7 +4,8 @@ Three effects keep the chords of a scanned mesh from being these lengths, and ea
 (:mod:`.smoothing` removes it), creases shorten them (:mod:`.creases` unfolds them), and what smoothing leaves of the
 one or adds to the other is a bias of the estimate as a whole. The last is measured where the truth is known: the smooth
 mesh is given noise anew, with both signs so that what is odd in it cancels, and smoothed again; by what the lengths of
-the mesh have changed then, those of the scan are corrected (the parametric bootstrap).
+the mesh have changed then, those of the scan are corrected (the parametric bootstrap), and by half as much again, for
+a mesh that was smoothed once has less to lose the second time.
 
 References
 ----------
@@ -24,6 +25,11 @@ from deskew.flattening.smoothing import smooth
 from deskew.types import Array, Floats
 
 _SEED = 20010707
+# The bias over what the bootstrap shows of it; it is 1.2 to 2.3 on the sheets that this was chosen on.
+_UNDERRATED = 1.5
+# Largest correction of one length, as a logarithm: more is an accident of the noise.
+_LARGEST_CORRECTION = 0.1
+_NOTHING = 1e-200  # [mm], in place of the length between coincident vertices
 # Noise below this share of the mean edge changes no length by more than a millionth.
 _NEGLIGIBLE = 1e-4
 
@@ -71,7 +77,9 @@ def _bootstrapped(vertices: Floats, faces: Array, rays: Rays, sigma_mm: float) -
     noise = np.random.default_rng(_SEED).normal(0.0, sigma_mm, len(vertices))
     found = [smooth(hinges, parent + sign * noise, sigma_mm) for sign in (1.0, -1.0)]
     mean = sum(crease_lengths(_moved(vertices, offsets, rays), rays) for offsets in found) / len(found)
-    return np.asarray(lengths * (lengths / mean))
+    ratio = np.maximum(lengths, _NOTHING) / np.maximum(mean, _NOTHING)
+    correction = np.clip(_UNDERRATED * np.log(ratio), -_LARGEST_CORRECTION, _LARGEST_CORRECTION)
+    return np.asarray(lengths * np.exp(correction))
 
 
 def _moved(vertices: Floats, offsets: Floats, rays: Rays) -> Floats:

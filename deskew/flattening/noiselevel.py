@@ -65,7 +65,7 @@ def _laplacian(vertices: Floats, faces: Array, directions: Floats) -> tuple[csr_
         u, v = (vertices[end] - vertices[a] for end in (b, c))
         u, v = (side - np.einsum("fk,fk->f", side, up)[:, None] * up for side in (u, v))
         area = np.abs(np.einsum("fk,fk->f", np.cross(u, v), up))
-        cotangent = np.einsum("fk,fk->f", u, v) / np.maximum(area, 1e-300)
+        cotangent = np.einsum("fk,fk->f", u, v) / np.maximum(area, 1e-200)
         weight = np.clip(cotangent, -_SHARPEST, _SHARPEST) / 2
         rows += [b, c, b, c]
         columns += [c, b, b, c]

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from deskew.errors import require
 from deskew.flattening.directions import noise_directions
 from deskew.flattening.hinges import Hinges, hinges_of
 from deskew.types import Array, Floats
@@ -28,7 +29,7 @@ _CONVEX_PASSES, _SHARP_PASSES = 4, 6
 # Jumps of slope below eps are smoothed, those above are creases. Times the root of sigma over the mean edge: paper
 # bends as it does whatever the noise, but what can be told from noise grows with it.
 _CONVEX_EPS, _SHARP_EPS = 0.04, 0.06
-_SHARPNESS = 0.18  # k above, times the same root
+_SHARPNESS = 0.125  # k above, times the same root
 _REGULAR = 12  # hinges that touch an inner vertex with six neighbours
 _RESIDUAL = 0.02  # root mean square of the linear solver's residual, in units of sigma
 _MAX_ITERATIONS = 200
@@ -50,8 +51,14 @@ def denoise(vertices: Floats, faces: Array, sigma_mm: float) -> Floats:
     -------
     (V, 3) array
         Positions [mm], moved along :func:`deskew.flattening.directions.noise_directions` alone.
+
+    Raises
+    ------
+    InputError
+        If `sigma_mm` is negative or not finite.
     """
-    if sigma_mm <= 0.0:
+    require(0.0 <= sigma_mm < np.inf, "sigma_mm", "be finite and not negative [mm]", sigma_mm)
+    if sigma_mm == 0.0:
         return np.array(vertices, dtype=np.float64)
     directions = noise_directions(vertices, faces)
     hinges = hinges_of(vertices, faces, directions)
@@ -116,40 +123,18 @@ def _solve(
 
     Jacobi-preconditioned; stops when the squared residual falls to `tolerance`. Returns the iterations.
     """
-    residual, diagonal = noisy - x, np.ones_like(x)
-    for m in range(len(corners)):
-        t = jumps[m]
-        for k in range(4):
-            t += stencils[m, k] * x[corners[m, k]]
-        for k in range(4):
-            residual[corners[m, k]] -= stiffness[m] * t * stencils[m, k]
-            diagonal[corners[m, k]] += stiffness[m] * stencils[m, k] ** 2
+    residual, diagonal, image = np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    _downhill(corners, stencils, jumps, stiffness, noisy, x, residual, diagonal)
     direction = residual / diagonal
-    image = np.empty_like(x)
-    descent = 0.0
-    for v in range(len(x)):
-        descent += residual[v] * direction[v]
+    descent = float(np.sum(residual * direction))
     for n in range(max_iterations):
-        image[:] = direction
-        for m in range(len(corners)):
-            i, j, c, d = corners[m, 0], corners[m, 1], corners[m, 2], corners[m, 3]
-            t = stiffness[m] * (
-                stencils[m, 0] * direction[i]
-                + stencils[m, 1] * direction[j]
-                + stencils[m, 2] * direction[c]
-                + stencils[m, 3] * direction[d]
-            )
-            image[i] += t * stencils[m, 0]
-            image[j] += t * stencils[m, 1]
-            image[c] += t * stencils[m, 2]
-            image[d] += t * stencils[m, 3]
-        curvature = 0.0
+        _curve(corners, stencils, stiffness, direction, image)
+        curvature, size, next_descent = 0.0, 0.0, 0.0
         for v in range(len(x)):
             curvature += direction[v] * image[v]
         if curvature <= 0.0:
             return n
         step = descent / curvature
-        size, next_descent = 0.0, 0.0
         for v in range(len(x)):
             x[v] += step * direction[v]
             residual[v] -= step * image[v]
@@ -161,3 +146,40 @@ def _solve(
             direction[v] = residual[v] / diagonal[v] + next_descent / descent * direction[v]
         descent = next_descent
     return max_iterations
+
+
+@njit(cache=True)
+def _downhill(
+    corners: Array,
+    stencils: Floats,
+    jumps: Floats,
+    stiffness: Floats,
+    noisy: Floats,
+    x: Floats,
+    residual: Floats,
+    diagonal: Floats,
+) -> None:
+    """Fill `residual` with minus half the gradient at x and `diagonal` with the matrix's."""
+    for v in range(len(x)):
+        residual[v], diagonal[v] = noisy[v] - x[v], 1.0
+    for m in range(len(corners)):
+        t = jumps[m]
+        for k in range(4):
+            t += stencils[m, k] * x[corners[m, k]]
+        for k in range(4):
+            residual[corners[m, k]] -= stiffness[m] * t * stencils[m, k]
+            diagonal[corners[m, k]] += stiffness[m] * stencils[m, k] ** 2
+
+
+@njit(cache=True)
+def _curve(corners: Array, stencils: Floats, stiffness: Floats, x: Floats, image: Floats) -> None:
+    """Multiply x by the matrix, into `image`."""
+    image[:] = x
+    for m in range(len(corners)):
+        i, j, c, d = corners[m, 0], corners[m, 1], corners[m, 2], corners[m, 3]
+        t = stencils[m, 0] * x[i] + stencils[m, 1] * x[j] + stencils[m, 2] * x[c] + stencils[m, 3] * x[d]
+        t *= stiffness[m]
+        image[i] += t * stencils[m, 0]
+        image[j] += t * stencils[m, 1]
+        image[c] += t * stencils[m, 2]
+        image[d] += t * stencils[m, 3]
