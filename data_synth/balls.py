@@ -47,7 +47,7 @@ class BallPlate:
         On the balls it is at most the angle of the rim, on the plate it is more; NaN stays NaN.
         """
         away = points[None] - self.centres.reshape(2, *(1,) * (points.ndim - 1), 3)
-        return np.asarray(np.degrees(np.arccos(away @ self.normal / np.linalg.norm(away, axis=-1))))
+        return np.asarray(np.degrees(np.arccos(np.clip(away @ self.normal / np.linalg.norm(away, axis=-1), -1.0, 1.0))))
 
 
 def ball_plate(

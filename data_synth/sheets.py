@@ -83,7 +83,7 @@ def slopes_deg(vertices: Floats) -> Floats:
         Degrees in [0, 180]; beyond 90 the cell is seen from behind.
     """
     normals = np.cross(vertices[:-1, 1:] - vertices[1:, :-1], vertices[:-1, :-1] - vertices[1:, 1:])
-    return np.asarray(np.degrees(np.arccos(normals[..., 2] / np.linalg.norm(normals, axis=-1))))
+    return np.asarray(np.degrees(np.arctan2(np.linalg.norm(normals[..., :2], axis=-1), normals[..., 2])))
 
 
 def projected_cells(vertices: Floats) -> Floats:

@@ -17,9 +17,9 @@ import pytest
 
 import deskew
 from deskew import io
-from deskew.acquisition import DenoiseSettings, InkSettings
 from deskew.cli import main
 from deskew.errors import StepError
+from deskew.recipes import BEST, PAPER, Recipe
 from deskew.restoration import Textures
 from deskew.types import (
     Board,
@@ -77,9 +77,11 @@ class StandIn:
         self._step("calibrate", board=board, poses=poses)
         return replace(CALIBRATION, n_poses=len(poses))
 
-    def scan(self, page: Capture, calibration: Calibration, *, shape: tuple[int, int], **how: Any) -> Scan:
+    def scan_by(
+        self, recipe: Recipe, page: Capture, calibration: Calibration, *, shape: tuple[int, int], mask: Any
+    ) -> Scan:
         frames = [*page.columns, *page.rows]
-        self._step("scan", frames=frames, calibration=calibration, shape=shape, **how)
+        self._step("scan", recipe=recipe, frames=frames, calibration=calibration, shape=shape, mask=mask)
         reason = np.zeros((8, 12), np.uint8)
         reason[0, :3] = 1
         depth = DepthMap(np.where(reason == 0, 9.0, np.nan), reason, CAMERA)
@@ -115,7 +117,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     io.write_capture(capture(), tmp_path / "page")
     io.write_board(Board((5, 4), 25.0), [capture(1), capture(2)], tmp_path / "board")
     io.write_calibration(CALIBRATION, tmp_path / "c.json")
-    io.write_scan(StandIn().scan(capture(), CALIBRATION, shape=(3, 4)), tmp_path / "scan.npz")
+    io.write_scan(StandIn().scan_by(BEST, capture(), CALIBRATION, shape=(3, 4), mask=None), tmp_path / "scan.npz")
     (tmp_path / "out").mkdir()
     for name, size, level in (("mask", (8, 12), 255), ("dark", (8, 12), 0), ("small", (4, 4), 255)):
         io.write_image(np.full(size, level, np.uint8), tmp_path / f"{name}.png")
@@ -157,16 +159,29 @@ def test_scan_writes_everything_for_restore(
     assert np.array_equal(io.read_image(here / "out" / "r.png"), capture().white[::-1])
 
 
-def test_a_mask_and_the_corrections_of_depth_are_taken_when_asked_for(
-    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_mask_is_taken_when_asked_for(here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run page -c c.json -o out/r.png", capsys)[0] == 0
-    assert [steps.calls["scan"][name] for name in ("mask", "ink", "denoise")] == [None, None, None]
-    assert run("scan page -c c.json -o out/s.npz --mask mask.png --ink --denoise", capsys)[0] == 0
+    assert steps.calls["scan"]["mask"] is None
+    assert run("scan page -c c.json -o out/s.npz --mask mask.png", capsys)[0] == 0
     assert steps.calls["scan"]["mask"].shape == (8, 12)
     assert steps.calls["scan"]["mask"].dtype == np.bool_
-    assert steps.calls["scan"]["ink"] == InkSettings()
-    assert steps.calls["scan"]["denoise"] == DenoiseSettings()
+
+
+@pytest.mark.parametrize(
+    ("line", "recipe"),
+    [
+        ("run page -c c.json -o out/r.png", BEST),
+        ("run page -c c.json -o out/r.png -m paper_rk4", PAPER),
+        ("run page -c c.json -o out/r.png -m paper_rk4 --ink", replace(PAPER, ink=True)),
+        ("scan page -c c.json -o out/s.npz", BEST),
+        ("scan page -c c.json -o out/s.npz --no-ink --no-denoise", replace(BEST, ink=False, denoise=False)),
+    ],
+)
+def test_a_page_is_scanned_as_its_method_asks_unless_told_otherwise(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], line: str, recipe: Recipe
+) -> None:
+    assert run(line, capsys)[0] == 0
+    assert steps.calls["scan"]["recipe"] == recipe
 
 
 def test_a_scanned_mesh_carries_its_place_in_the_white_image(
@@ -245,7 +260,7 @@ def test_combinations_alone_are_made_of_all_lights(
 def test_a_ratio_asks_for_its_two_lights_alone(here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("restore scan.npz -o out/r.png --light uv --combine ratio:white/uv", capsys)[0] == 0
     assert steps.calls["restore"]["lights"] == ["uv", "white"]
-    scan = StandIn().scan(capture(), CALIBRATION, shape=(3, 4))
+    scan = StandIn().scan_by(BEST, capture(), CALIBRATION, shape=(3, 4), mask=None)
     more = replace(scan, images={**scan.images, "mean": scan.images["uv"], "raking": scan.images["uv"]})
     io.write_scan(more, here / "more.npz")
     assert run("restore more.npz -o out/s.png --combine ratio:white/uv", capsys)[0] == 0
@@ -349,7 +364,7 @@ def test_an_error_of_several_lines_is_said_in_one(
     def fail(*args: Any, **kwargs: Any) -> Scan:
         raise StepError("Scanning failed:\n  no light\x1b[2J in the picture.")
 
-    monkeypatch.setattr(steps, "scan", fail)
+    monkeypatch.setattr(steps, "scan_by", fail)
     wanted = "deskew: Scanning failed: no light?[2J in the picture.\n"
     assert run("run page -c c.json -o out/r.png", capsys) == (3, "", wanted)
 
@@ -445,7 +460,7 @@ def test_a_failing_machine_is_one_line_and_code_3(
     def fail(*args: Any, **kwargs: Any) -> Scan:
         raise error
 
-    monkeypatch.setattr(steps, "scan", fail)
+    monkeypatch.setattr(steps, "scan_by", fail)
     code, out, err = run("run page -c c.json -o out/r.png", capsys)
     assert (code, out, err.count("\n")) == (3, "", 1)
     assert err.startswith("deskew: The system refused: ")
@@ -458,7 +473,7 @@ def test_an_interrupt_leaves_nothing(
     def stop(*args: Any, **kwargs: Any) -> Scan:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(steps, "scan", stop)
+    monkeypatch.setattr(steps, "scan_by", stop)
     assert run("run page -c c.json -o out/r.png", capsys)[0] == 130
     assert list((here / "out").iterdir()) == []
 

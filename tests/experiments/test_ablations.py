@@ -33,9 +33,9 @@ def test_every_value_is_planned_beside_the_default_in_every_pose() -> None:
 def test_one_key_is_changed_and_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Config] = []
 
-    def calibrated(changed: Config, draw: int) -> Bench:
+    def calibrated(changed: Config, mode: str, draw: int) -> Bench:
         seen.append(changed)
-        assert draw == 0
+        assert (mode, draw) == ("temporal", 0)
         raise StepError("no board")
 
     monkeypatch.setattr(ablations, "calibrated_bench", calibrated)
@@ -64,7 +64,7 @@ def test_settings_reach_the_rig() -> None:
 
 
 def test_a_wide_stripe_is_scanned_on_every_body(monkeypatch: pytest.MonkeyPatch) -> None:
-    def known(changed: Config, draw: int) -> Bench:
+    def known(changed: Config, mode: str, draw: int) -> Bench:
         rig = configured_rig(changed.rig)
         residuals = {f"{name}_rms_px": 0.0 for name in ("camera", "projector")}
         return Bench(rig, Calibration(rig.camera, rig.projector, residuals))

@@ -39,7 +39,7 @@ def test_the_study_measures_every_pattern_on_both_pages(tmp_path: Path, monkeypa
     rig = data_synth.default_rig()
     rig = replace(rig, camera=smaller(rig.camera), projector=smaller(rig.projector))
     bench = Bench(rig, Calibration(rig.camera, rig.projector, {}, camera_psf_px=0.8))
-    monkeypatch.setattr(decoders, "calibrated_bench", lambda config: bench)
+    monkeypatch.setattr(decoders, "calibrated_bench", lambda config, mode: bench)
     line = ["experiment=decoders", "decoders.frames=[48]", "trials=1", "engine=serial", f"out={tmp_path / 'out'}"]
     assert main(line) == 0
     with (tmp_path / "out" / "results.csv").open() as file:

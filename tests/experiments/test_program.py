@@ -46,7 +46,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("ablations.stripe_width_px=[4]", ("`ablations.stripe_width_px`", "odd whole number", "[4]")),
         ("rig.gamma=0", ("`rig.gamma`", "[0.5, 4]", "0")),
         ("rig.ambient=-0.1", ("`rig.ambient`", "[0, 1]", "-0.1")),
-        ("scan.ink=some", ("`scan.ink`", "true or false", "got some")),
+        ("scan.ink=some", ("`scan.ink`", "true, false or null", "got some")),
         ("mesh.rows=1", ("`mesh.rows`", "[2, 1000]", "1")),
         ("colour=red", ("`colour`", "one of ablations, budget, decoders, engine, experiment")),
         ("+x=1", ("`x`", "existing key", "+x=1")),

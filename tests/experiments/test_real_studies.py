@@ -40,19 +40,27 @@ def run(out: Path, *overrides: str) -> dict[tuple[str, str], dict[str, float]]:
     return dict(found)
 
 
+METHODS = ("spring", "paper_euler", "paper_rk4")
+
+
 def test_corner_distance_measures_every_condition_by_both_detectors(tmp_path: Path) -> None:
     rows = run(tmp_path / "out", "experiment=corner_distance", "seed=4711")
     assert set(rows) == {
         *((f"{place}{detector}", "-") for place in ("control", "unrestored") for detector in ("", "/saddle")),
-        *((f"restored{d}", method) for d in ("", "/saddle") for method in ("paper_euler", "paper_rk4")),
+        *((f"restored{d}", method) for d in ("", "/saddle") for method in METHODS),
     }
     assert rows["control", "-"].keys() == CORNERS | {"detector_rms_px"}
     mesh = {"mesh_filled_fraction", "mesh_cut_quads"}
-    assert rows["unrestored", "-"].keys() == CORNERS | CALIBRATION | DEPTH | SHEET | mesh | {"meets_paper"}
+    assert rows["unrestored", "-"].keys() == CORNERS | CALIBRATION | SHEET | {"meets_paper"}
     assert rows["restored/saddle", "paper_rk4"].keys() == CORNERS | {"meets_paper"}
     more = {"dense_mean_mm", "dense_p95_mm", "dense_max_mm", "page_coverage", "at_rest", "steps", "steps_rejected"}
     more |= {"force_evaluations", "contacts", "strain_rms", "flips", "folded_quads", "meets_paper"}
-    assert rows["restored", "paper_euler"].keys() == CORNERS | more
+    # Each method has its own scan.
+    assert rows["restored", "paper_euler"].keys() == CORNERS | more | DEPTH | mesh
+    filtered = {f"depth_{name}_mm" for name in ("rms", "p95", "max", "bias")}
+    dynamic = {"steps", "steps_rejected", "force_evaluations", "contacts"}
+    assert rows["restored", "spring"].keys() == (CORNERS | more | DEPTH | mesh | filtered) - dynamic
+    assert rows["restored", "spring"]["dense_mean_mm"] < 0.7 * rows["restored", "paper_rk4"]["dense_mean_mm"]
     assert 0.003 < rows["control/saddle", "-"]["detector_rms_px"] < 0.05
     assert rows["restored", "paper_euler"]["corner_mean_px"] < rows["unrestored", "-"]["corner_mean_px"]
     assert (tmp_path / "out" / "figures" / "pages.png").is_file()
@@ -104,7 +112,7 @@ def test_a_page_that_cannot_be_scanned_fails_each_of_its_rows(tmp_path: Path, mo
     write_arrays({"V": sheet.vertices[::10, ::10], "F": sheet.flat[::10, ::10]}, path)
     rows = run(tmp_path / "out", "experiment=corner_distance", f"sheet.paths=[{path}]")
     for detector in ("", "/saddle"):
-        for method in ("paper_euler", "paper_rk4"):
+        for method in METHODS:
             assert rows[f"restored{detector}", method] == {"failed": 1.0}
     assert "0 of 1" not in (tmp_path / "out" / "table.md").read_text()
     assert np.isfinite(rows["unrestored", "-"]["corner_mean_px"])

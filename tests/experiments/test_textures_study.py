@@ -19,7 +19,7 @@ TEXTS = {"uv_text": "uv", "backlight_text": "backlight", "raking_text": "raking"
 LIGHTS = ("white", "above", "raking", "uv", "backlight")
 
 
-def true_bench(config: Config) -> Bench:
+def true_bench(config: Config, mode: str) -> Bench:
     """The true devices, which saves the boards' photographs."""
     rig = data_synth.default_rig(config.rig.noise_scale)
     return Bench(rig, Calibration(rig.camera, rig.projector, {}, camera_psf_px=0.805))
