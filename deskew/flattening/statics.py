@@ -115,14 +115,15 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:
     """Search from finer and finer starts until nothing is folded; return the result, its folded quads, the searches."""
     even = _is_even(springs)
-    uniform = hierarchy(spring_constants(springs.grid, 1.0))
+    # As stiff as the springs themselves: the steps that bring forces to rest are measured by it.
+    uniform = hierarchy(spring_constants(springs.grid, springs.k_max))
     pyramid = _pyramid(sheet, springs, len(uniform.levels))
     solver = uniform if even and np.ptp(springs.k_s[springs.k_s > 0]) == 0 and not springs.cut.any() else None
     starts = list(dict.fromkeys(_level_within(pyramid, limit) for limit in (*_STARTS, max(springs.grid))))
     n_starts = 0
     for start in starts:
         n_starts += 1
-        x = _started(pyramid, uniform, start)
+        x = _started(pyramid, uniform, springs.k_max, start)
         if even:
             found = _settle(x, springs, solver or hierarchy(springs.k_s), 0, tolerance, most)
         else:
@@ -174,12 +175,15 @@ def _level_within(pyramid: list[_Grid], limit: int) -> int:
     return next(level for level, grid in enumerate(pyramid) if max(grid.shape) <= limit or level == len(pyramid) - 1)
 
 
-def _started(pyramid: list[_Grid], uniform: Hierarchy, start: int) -> Floats:
-    """Lay out level `start` conformally and refine it to the finest, not yet settled there: places (R, C, 2) [mm]."""
+def _started(pyramid: list[_Grid], uniform: Hierarchy, k_s: float, start: int) -> Floats:
+    """Lay out level `start` conformally and refine it to the finest, not yet settled there: places (R, C, 2) [mm].
+
+    `uniform` holds the levels of a grid whose springs all have the constant `k_s`.
+    """
     x = conformal_start(pyramid[start].rest)
     for level in range(start, 0, -1):
         grid = pyramid[level]
-        springs = Springs(grid.rest, spring_constants(grid.shape, 1.0))
+        springs = Springs(grid.rest, spring_constants(grid.shape, k_s))
         x = _settle(x, springs, uniform, level, _COARSE_TOLERANCE * springs.rest_mean, _COARSE_ITERATIONS).x
         x = interpolated(x, pyramid[level - 1].shape)
     return x

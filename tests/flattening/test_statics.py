@@ -155,6 +155,17 @@ def test_any_ratio_of_stiffness_converges_to_where_no_force_is_left(ratio: float
     assert np.abs(force).max() < 1e-4 * max(1.0, ratio) * springs.rest_mean
 
 
+@pytest.mark.parametrize("k_s", [1e-9, 0.3, 7.0, 1e12])
+def test_constant_of_even_springs_changes_nothing_but_the_energy(k_s: float) -> None:
+    vertices = folded(4)
+    plain = flatten(Sheet(vertices))
+    by_map = Sheet(vertices, stiffness=np.full((SHAPE[0] - 1, SHAPE[1] - 1), k_s))
+    for result in (flatten(Sheet(vertices), k_s=k_s), flatten(by_map)):
+        assert result.counters["iterations"] == plain.counters["iterations"]
+        assert result.counters["spring_energy"] == pytest.approx(k_s * plain.counters["spring_energy"], rel=1e-6)
+        assert np.allclose(result.vertices, plain.vertices, atol=1e-6)
+
+
 def test_stiff_region_keeps_its_shape_and_the_soft_one_gives() -> None:
     vertices = folded(4)
     leaf = np.s_[8:15, 10:20]
