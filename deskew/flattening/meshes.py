@@ -158,7 +158,7 @@ def _solve(plate: _Plate, stiffness: Floats, build: BuildEnergy, step_mm: float,
     best: _Found | None = None
     iterations = 0
     for start in plate.starts(model, system):
-        x, n, converged = minimise(model, system, start, step_mm, max_iterations, uneven=uneven)
+        x, n, _, converged = minimise(model, system, start, step_mm, max_iterations, uneven=uneven)
         iterations += n
         flips = int(plate.turned_over(x).sum())
         if np.isfinite(x).all() and (best is None or flips < best.flips):
@@ -184,7 +184,7 @@ def _stiffened(
         stiffness = np.where(around, _STIFFEN * stiffness, stiffness)
         model = build(plate.shapes, plate.faces, plate.edges, stiffness)
         system = Laplacian(plate.edges.ends, model.weights, plate.n_vertices)
-        x, n, converged = minimise(model, system, found.x, step_mm, max_iterations)
+        x, n, _, converged = minimise(model, system, found.x, step_mm, max_iterations)
         if not np.isfinite(x).all():
             break
         flips = int(plate.turned_over(x).sum())

@@ -16,11 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from deskew.errors import require
-from deskew.flattening import newton
+from deskew.flattening import energies
 from deskew.flattening.anderson import Iterated, accelerate
+from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.inside import flat_surface
+from deskew.flattening.laplace import laplacian
 from deskew.flattening.multigrid import Hierarchy, coarse_index, hierarchy, interpolated, v_cycle
 from deskew.flattening.settings import StaticSettings
 from deskew.flattening.springs import Springs, chord_lengths, grid_springs, spring_constants
@@ -79,7 +81,7 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     counters = {
         "iterations": float(found.n_iterations),
         "residual_mm": found.residual,
-        "spring_energy": newton.energy(found.x.reshape(-1, 2), newton.SpringList(*springs.pairs()))
+        "spring_energy": _listed(springs).value(found.x.reshape(-1, 2))
         if len(springs.rest) > 4
         else float(flat_energy(found.x, springs.rest, springs.k_s)),
         "folded_quads": float(folded),
@@ -127,8 +129,7 @@ def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tu
         if even:
             found = _settle(x, springs, solver or hierarchy(springs.k_s), 0, tolerance, most)
         else:
-            flat = newton.minimise(x.reshape(-1, 2), newton.SpringList(*springs.pairs()), tolerance, most)
-            found = flat._replace(x=flat.x.reshape(x.shape))
+            found = _settle_uneven(x, springs, tolerance, most)
         folded = int(count_folded(found.x, springs.cut, -1.0))
         if not folded:
             break
@@ -202,6 +203,21 @@ def _settle(x: Floats, springs: Springs, solver: Hierarchy, at: int, tolerance: 
 
     found = accelerate(local_global, framed, tolerance, most)
     return found._replace(x=np.ascontiguousarray(found.x[1:-1, 1:-1]))
+
+
+def _settle_uneven(x: Floats, springs: Springs, tolerance: float, most: int) -> Iterated:
+    """Bring springs to rest by Newton's method, whatever their stiffness and reach."""
+    model = _listed(springs)
+    matrix = laplacian(model.ends, model.weights, x.shape[0] * x.shape[1])
+    found = newton(model, matrix, x.reshape(-1, 2), tolerance, most)
+    return found._replace(x=found.x.reshape(x.shape))
+
+
+def _listed(springs: Springs) -> energies.Springs:
+    """Springs of a grid as those of any mesh."""
+    a, b, rest, k_s = springs.pairs()
+    there = k_s > 0
+    return energies.Springs(np.stack([a, b], axis=-1)[there], k_s[there], rest[there])
 
 
 def _handedness(vertices: Floats) -> float:
