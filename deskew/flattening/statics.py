@@ -36,6 +36,7 @@ _OVER = 1.7
 _EVEN = 4.0
 # Smooth changes are the slowest to settle, and cheap on a coarse level: share of a vertex spacing that counts as none.
 _COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-4, 200
+_SHORTEST_START = 1e-3  # of the mean spring: lengths across a cut count as no shorter at the start
 
 # Share of a sheet's area, as seen from above, that must show its back before its grid counts as mirrored.
 _UPSIDE_DOWN = 0.25
@@ -115,25 +116,24 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
 
 
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:
-    """Search from finer and finer starts until nothing is folded; return the result, its folded quads, the searches."""
+    """Search from finer and finer starts until nothing is folded; return the best, its folded quads, the searches."""
     even = _is_even(springs)
     # As stiff as the springs themselves: the steps that bring forces to rest are measured by it.
     uniform = hierarchy(spring_constants(springs.grid, springs.k_max))
     pyramid = _pyramid(sheet, springs, len(uniform.levels))
     solver = uniform if even and np.ptp(springs.k_s[springs.k_s > 0]) == 0 and not springs.cut.any() else None
     starts = list(dict.fromkeys(_level_within(pyramid, limit) for limit in (*_STARTS, max(springs.grid))))
-    n_starts = 0
+    searches: list[tuple[Iterated, int]] = []
     for start in starts:
-        n_starts += 1
         x = _started(pyramid, uniform, springs.k_max, start)
         if even:
             found = _settle(x, springs, solver or hierarchy(springs.k_s), 0, tolerance, most)
         else:
             found = _settle_uneven(x, springs, tolerance, most)
-        folded = int(count_folded(found.x, springs.cut, -1.0))
-        if not folded:
+        searches.append((found, int(count_folded(found.x, springs.cut, -1.0))))
+        if not searches[-1][1]:
             break
-    return found, folded, n_starts
+    return *min(searches, key=lambda search: search[1]), len(searches)
 
 
 def _is_even(springs: Springs) -> bool:
@@ -149,7 +149,8 @@ def _pyramid(sheet: Sheet, springs: Springs, n_levels: int) -> list[_Grid]:
     """
     rest = springs.rest[:4]
     if springs.cut.any():
-        chords = chord_lengths(sheet.vertices)
+        # Nothing asks the vertices across a cut to be distinct.
+        chords = np.maximum(chord_lengths(sheet.vertices), _SHORTEST_START * springs.rest_mean)
         rest = np.where(rest > 0, rest, chords)
     grids = [_Grid(rest, sheet.vertices)]
     while len(grids) < n_levels:

@@ -225,6 +225,28 @@ def test_sections_lay_a_coarse_grid_down_as_the_dense_one_would() -> None:
     assert np.allclose(through.vertices, section.surface)
 
 
+def test_sections_serve_the_other_energy_as_well() -> None:
+    dense, flat = mirror_folds(7, (133, 177))
+    coarse = Sheet(dense[::4, ::4], surface=dense)
+    errors = [
+        rigid_error(flatten(coarse, **{"energy": "arap"} | asked).vertices[..., :2], flat[::4, ::4]).mean()
+        for asked in ({"energy": "springs"}, {}, {"rest": "chord"})
+    ]
+    assert 0 < errors[1] < 1.2 * errors[0] < 0.15 * errors[2]
+    with pytest.raises(InputError, match="`noise_mm` must be 0 for a sheet with a surface"):
+        flatten(coarse, noise_mm="auto")
+
+
+def test_noise_of_a_grid_is_found_and_removed() -> None:
+    vertices, flat = mirror_folds(3, (90, 120))
+    vertices[..., 2] += np.random.default_rng(0).normal(0, 0.3, vertices.shape[:2])
+    blind, clean = deskew.flatten(vertices), deskew.flatten(vertices, noise_mm="auto")
+    assert clean.vertices.shape == vertices.shape
+    assert clean.counters["noise_estimated_mm"] == pytest.approx(0.3, rel=0.03)
+    assert 0 < rigid_error(clean.vertices[..., :2], flat).mean() < 0.1
+    assert rigid_error(blind.vertices[..., :2], flat).mean() > 0.5
+
+
 def test_wrong_ways_through_a_dense_grid_are_refused() -> None:
     with pytest.raises(InputError, match="`through` must divide both sides' 22 and 30 quads, got 4"):
         flatten(Sheet(folded(0)), through=4)
@@ -242,6 +264,19 @@ def test_cut_pieces_flatten_without_pulling_at_each_other() -> None:
     assert result.status is Status.AT_REST
     for part in (np.s_[:, :11], np.s_[:, 11:]):
         assert rigid_error(result.vertices[part][..., :2], flat[part][..., :2]).max() < 1e-3
+
+
+def test_vertices_inside_a_cut_may_be_loose_and_coincide() -> None:
+    vertices, flat = mirror_folds(3, (17, 17))
+    cut = np.zeros((16, 16), dtype=bool)
+    cut[3:9, 3:9] = True
+    vertices[4:9, 4:9] = vertices[6, 6]
+    held = np.ones((17, 17), dtype=bool)
+    held[4:9, 4:9] = False
+    for stiffness in (None, np.where(np.arange(16) < 8, 1.0, 100.0) * np.ones((16, 1))):
+        result = flatten(Sheet(vertices, stiffness=stiffness, cut=cut))
+        assert result.status is Status.AT_REST
+        assert 0 < rigid_error(result.vertices[held][:, None, :2], flat[held][:, None]).mean() < 0.5
 
 
 def test_conformal_start_of_a_developable_grid_is_its_development() -> None:
