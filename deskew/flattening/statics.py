@@ -18,6 +18,7 @@ import numpy as np
 from deskew.errors import require
 from deskew.flattening import energies
 from deskew.flattening.anderson import Iterated, accelerate
+from deskew.flattening.asseen import as_seen, is_upside_down
 from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
@@ -37,9 +38,6 @@ _EVEN = 4.0
 # Smooth changes are the slowest to settle, and cheap on a coarse level: share of a vertex spacing that counts as none.
 _COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-4, 200
 _SHORTEST_START = 1e-3  # of the mean spring: lengths across a cut count as no shorter at the start
-
-# Share of a sheet's area, as seen from above, that must show its back before its grid counts as mirrored.
-_UPSIDE_DOWN = 0.25
 
 _FOLDED = "{folded} quads are folded over: scan the page again with more vertices, or remove noise (`noise_mm`)."
 _UNSETTLED = "The springs are still moving after {n} iterations: raise `max_iterations` or `tolerance`."
@@ -222,40 +220,7 @@ def _listed(springs: Springs) -> energies.Springs:
 
 
 def _handedness(vertices: Floats) -> float:
-    """-1 if a grid's columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored.
-
-    A sheet rolled by more than half a turn shows some of its back, but never as much as a quarter of its area.
-    """
+    """-1 if a grid's columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored."""
     across, down = vertices[1:, 1:] - vertices[:-1, :-1], vertices[1:, :-1] - vertices[:-1, 1:]
     # Twice a quad's area is the cross product of its diagonals.
-    normals = np.cross(across, down)
-    seen = float(normals[..., 2].sum())
-    return 1.0 if seen > _UPSIDE_DOWN * float(np.sqrt(np.einsum("ijk,ijk->ij", normals, normals)).sum()) else -1.0
-
-
-def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
-    """Turn and move flat places to where the sheet is as seen from above.
-
-    Parameters
-    ----------
-    places : (..., 2) array
-        Flattened [mm].
-    vertices : (..., 3) array
-        The sheet [mm].
-    mirror : float
-        -1 to turn the flat sheet over first.
-
-    Returns
-    -------
-    (..., 3) array
-        With z = 0 [mm].
-    """
-    p = places - places.reshape(-1, 2).mean(axis=0)
-    p[..., 1] *= mirror
-    middle = vertices[..., :2].reshape(-1, 2).mean(axis=0)
-    px, py, qx, qy = p[..., 0], p[..., 1], vertices[..., 0] - middle[0], vertices[..., 1] - middle[1]
-    angle = np.arctan2(float((px * qy - py * qx).sum()), float((px * qx + py * qy).sum()))
-    flat = np.zeros(vertices.shape)
-    flat[..., 0] = np.cos(angle) * px - np.sin(angle) * py + middle[0]
-    flat[..., 1] = np.sin(angle) * px + np.cos(angle) * py + middle[1]
-    return flat
+    return 1.0 if is_upside_down(np.cross(down, across)) else -1.0
