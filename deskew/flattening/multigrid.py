@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from deskew.flattening.relaxation import invert_diagonal, residual, sweep
 from deskew.types import Array, Floats
 
 # A level of at most this many vertices a side is solved by a dense inverse.
@@ -92,7 +93,7 @@ def hierarchy(k_s: Floats) -> Hierarchy:
 
 def _level(weights: Floats) -> Level:
     inverse = np.zeros(weights.shape[:2])
-    _invert_diagonal(weights, inverse)
+    invert_diagonal(weights, inverse)
     correction, force, left = np.zeros((3, *weights.shape[:2], 2))
     return Level(weights, inverse, correction, force, left)
 
@@ -142,17 +143,6 @@ def _transpose(weights, turned):  # type: ignore[no-untyped-def]
             # Joins (r, c) and (r + 1, c - 1): turned, (c - 1, r + 1) and, below left of it, (c, r).
             if weights[r, c, 3] != 0.0:
                 turned[c - 1, r + 1, 3] = weights[r, c, 3]
-
-
-@njit(cache=True)
-def _invert_diagonal(weights, inverse):  # type: ignore[no-untyped-def]
-    for r in range(1, weights.shape[0] - 1):
-        for c in range(1, weights.shape[1] - 1):
-            total = (
-                weights[r, c, 0] + weights[r, c, 1] + weights[r, c, 2] + weights[r, c, 3]
-                + weights[r, c - 1, 0] + weights[r - 1, c, 1] + weights[r - 1, c - 1, 2] + weights[r - 1, c + 1, 3]
-            )  # fmt: skip
-            inverse[r, c] = 1.0 / total if total > 0.0 else 0.0
 
 
 @njit(cache=True, inline="always")
@@ -214,51 +204,6 @@ def _halve_columns(weights, columns, coarse):  # type: ignore[no-untyped-def]
                         _join(coarse, r, a1, s, b1, k * p1 * q1)
 
 
-@njit(cache=True, inline="always")
-def _relax(weights, inverse, x, f, r, c):  # type: ignore[no-untyped-def]
-    """Give vertex (r, c) the place that its neighbours and its force ask for."""
-    w0, w1, w2, w3 = weights[r, c, 0], weights[r, c, 1], weights[r, c, 2], weights[r, c, 3]
-    w4, w5 = weights[r, c - 1, 0], weights[r - 1, c, 1]
-    w6, w7 = weights[r - 1, c - 1, 2], weights[r - 1, c + 1, 3]
-    d = inverse[r, c]
-    for k in range(2):
-        x[r, c, k] = d * (
-            f[r, c, k]
-            + w0 * x[r, c + 1, k] + w1 * x[r + 1, c, k] + w2 * x[r + 1, c + 1, k] + w3 * x[r + 1, c - 1, k]
-            + w5 * x[r - 1, c, k] + w6 * x[r - 1, c - 1, k] + w7 * x[r - 1, c + 1, k]
-            + w4 * x[r, c - 1, k]
-        )  # fmt: skip
-
-
-@njit(cache=True)
-def _sweep(weights, inverse, x, f, forward):  # type: ignore[no-untyped-def]
-    rows, columns = x.shape[0] - 2, x.shape[1] - 2
-    if forward:
-        for r in range(1, rows + 1):
-            for c in range(1, columns + 1):
-                _relax(weights, inverse, x, f, r, c)
-    else:
-        for r in range(rows, 0, -1):
-            for c in range(columns, 0, -1):
-                _relax(weights, inverse, x, f, r, c)
-
-
-@njit(cache=True)
-def _residual(weights, x, f, left):  # type: ignore[no-untyped-def]
-    """Write what the correction x leaves of the force f, f - A x, into `left`."""
-    for r in range(1, x.shape[0] - 1):
-        for c in range(1, x.shape[1] - 1):
-            w0, w1, w2, w3 = weights[r, c, 0], weights[r, c, 1], weights[r, c, 2], weights[r, c, 3]
-            w4, w5 = weights[r, c - 1, 0], weights[r - 1, c, 1]
-            w6, w7 = weights[r - 1, c - 1, 2], weights[r - 1, c + 1, 3]
-            total = w0 + w1 + w2 + w3 + w4 + w5 + w6 + w7
-            for k in range(2):
-                left[r, c, k] = f[r, c, k] - total * x[r, c, k] + (
-                    w0 * x[r, c + 1, k] + w1 * x[r + 1, c, k] + w2 * x[r + 1, c + 1, k] + w3 * x[r + 1, c - 1, k]
-                    + w4 * x[r, c - 1, k] + w5 * x[r - 1, c, k] + w6 * x[r - 1, c - 1, k] + w7 * x[r - 1, c + 1, k]
-                )  # fmt: skip
-
-
 @njit(cache=True)
 def _restrict(left, force):  # type: ignore[no-untyped-def]
     """Hand each fine residual to the coarse vertices that its vertex is interpolated from (P^T)."""
@@ -311,12 +256,12 @@ def v_cycle(hierarchy: Hierarchy, at: int = 0) -> None:
         return
     below = hierarchy.levels[at + 1]
     level.correction[:] = 0.0
-    _sweep(level.weights, level.inverse, level.correction, level.force, True)
-    _residual(level.weights, level.correction, level.force, level.left)
+    sweep(level.weights, level.inverse, level.correction, level.force, True)
+    residual(level.weights, level.correction, level.force, level.left)
     _restrict(level.left, below.force)
     v_cycle(hierarchy, at + 1)
     _prolong(below.correction, level.correction)
-    _sweep(level.weights, level.inverse, level.correction, level.force, False)
+    sweep(level.weights, level.inverse, level.correction, level.force, False)
 
 
 def interpolated(coarse: Floats, grid: tuple[int, int]) -> Floats:
