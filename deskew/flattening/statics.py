@@ -11,7 +11,7 @@ quads are counted at the end; if there are any, the search begins again from a f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,7 +21,16 @@ from deskew.flattening.anderson import Iterated, accelerate
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.inside import flat_surface
-from deskew.flattening.multigrid import Hierarchy, coarse_index, hierarchy, interpolated, v_cycle
+from deskew.flattening.multigrid import (
+    Hierarchy,
+    framed,
+    hierarchy,
+    moved,
+    unframed,
+    v_cycle,
+)
+from deskew.flattening.placement import as_seen, handedness
+from deskew.flattening.pyramid import Grid, pyramid, refined
 from deskew.flattening.settings import StaticSettings
 from deskew.flattening.springs import Springs, chord_lengths, grid_springs, spring_constants
 from deskew.types import Flattened, Floats, Sheet, Status
@@ -35,23 +44,8 @@ _EVEN = 4.0
 # Smooth changes are the slowest to settle, and cheap on a coarse level: share of a vertex spacing that counts as none.
 _COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-4, 200
 
-# Share of a sheet's area, as seen from above, that must show its back before its grid counts as mirrored.
-_UPSIDE_DOWN = 0.25
-
 _FOLDED = "{folded} quads are folded over: scan the page again with more vertices, or remove noise (`noise_mm`)."
 _UNSETTLED = "The springs are still moving after {n} iterations: raise `max_iterations` or `tolerance`."
-
-
-@dataclass(frozen=True, slots=True)
-class _Grid:
-    """One level: rest lengths (4, R, C) and vertices (R, C, 3) [mm]."""
-
-    rest: Floats
-    vertices: Floats
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.rest.shape[1], self.rest.shape[2]
 
 
 def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
@@ -90,7 +84,7 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
         status, remedy = Status.FOLDED, _FOLDED.format(folded=folded)
     elif not found.converged:
         status, remedy = Status.LOCKED, _UNSETTLED.format(n=found.n_iterations)
-    flat = as_seen(found.x, sheet.vertices, -_handedness(sheet.vertices))
+    flat = as_seen(found.x, sheet.vertices, -handedness(sheet.vertices))
     inside = None if sheet.surface is None else flat_surface(sheet.surface, flat, sheet.refinement)
     return Flattened(flat, status, remedy, counters, inside)
 
@@ -105,7 +99,7 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
     coarse = Sheet(sheet.vertices[::n, ::n], surface=sheet.vertices)
     flat = flatten_grid(coarse, replace(settings, through=1))
     assert flat.surface is not None
-    folded = int(count_folded(flat.surface, np.zeros((shape[0] - 1, shape[1] - 1), bool), _handedness(sheet.vertices)))
+    folded = int(count_folded(flat.surface, np.zeros((shape[0] - 1, shape[1] - 1), bool), handedness(sheet.vertices)))
     counters = {**flat.counters, "folded_quads": float(folded)}
     if folded and flat.status is Status.AT_REST:
         return Flattened(flat.surface, Status.FOLDED, _FOLDED.format(folded=folded), counters)
@@ -116,18 +110,20 @@ def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tu
     """Search from finer and finer starts until nothing is folded; return the result, its folded quads, the searches."""
     even = _is_even(springs)
     uniform = hierarchy(spring_constants(springs.grid, 1.0))
-    pyramid = _pyramid(sheet, springs, len(uniform.levels))
+    grids = _levels(sheet, springs, len(uniform.levels))
     solver = uniform if even and np.ptp(springs.k_s[springs.k_s > 0]) == 0 and not springs.cut.any() else None
-    starts = list(dict.fromkeys(_level_within(pyramid, limit) for limit in (*_STARTS, max(springs.grid))))
+    starts = list(dict.fromkeys(_level_within(grids, limit) for limit in (*_STARTS, max(springs.grid))))
     n_starts = 0
     for start in starts:
         n_starts += 1
-        x = _started(pyramid, uniform, start)
+        x = _started(grids, uniform, start)
         if even:
             found = _settle(x, springs, solver or hierarchy(springs.k_s), 0, tolerance, most)
+            found = found._replace(x=unframed(found.x))
         else:
-            flat = newton.minimise(x.reshape(-1, 2), newton.SpringList(*springs.pairs()), tolerance, most)
-            found = flat._replace(x=flat.x.reshape(x.shape))
+            listed = newton.SpringList(*springs.pairs())
+            found = newton.minimise(unframed(x).reshape(-1, 2), listed, tolerance, most)
+            found = found._replace(x=found.x.reshape(*springs.grid, 2))
         folded = int(count_folded(found.x, springs.cut, -1.0))
         if not folded:
             break
@@ -140,101 +136,38 @@ def _is_even(springs: Springs) -> bool:
     return len(springs.rest) == 4 and float(there.max()) <= _EVEN * float(there.min())
 
 
-def _pyramid(sheet: Sheet, springs: Springs, n_levels: int) -> list[_Grid]:
-    """Levels from fine to coarse; a coarse spring is as long as the two that it spans.
-
-    Coarse levels know neither cuts nor stiffness: they only start the search.
-    """
+def _levels(sheet: Sheet, springs: Springs, n: int) -> list[Grid]:
+    """Return `n` levels of the sheet; they know neither cuts nor stiffness, since they only start the search."""
     rest = springs.rest[:4]
     if springs.cut.any():
-        chords = chord_lengths(sheet.vertices)
-        rest = np.where(rest > 0, rest, chords)
-    grids = [_Grid(rest, sheet.vertices)]
-    while len(grids) < n_levels:
-        grids.append(_coarser(grids[-1]))
-    return grids
+        rest = np.where(rest > 0, rest, chord_lengths(sheet.vertices))
+    return pyramid(rest, sheet.vertices, n)
 
 
-def _coarser(fine: _Grid) -> _Grid:
-    rows, columns = (coarse_index(n) for n in fine.shape)
-    vertices = np.ascontiguousarray(fine.vertices[np.ix_(rows, columns)])
-    rest = chord_lengths(vertices)
-    rest[0, :, :-1] = np.add.reduceat(fine.rest[0][rows, :-1], columns[:-1], axis=1)
-    rest[1, :-1, :] = np.add.reduceat(fine.rest[1][:-1, columns], rows[:-1], axis=0)
-    # Where a side has an even number of vertices its last step is short, and no fine diagonals span that quad.
-    r, c = (int((np.diff(index) == 2).sum()) for index in (rows, columns))
-    falling, rising = fine.rest[2], fine.rest[3]
-    rest[2, :r, :c] = falling[0 : 2 * r : 2, 0 : 2 * c : 2] + falling[1 : 2 * r : 2, 1 : 2 * c : 2]
-    rest[3, :r, :c] = rising[1 : 2 * r : 2, 0 : 2 * c : 2] + rising[0 : 2 * r : 2, 1 : 2 * c : 2]
-    return _Grid(rest, vertices)
-
-
-def _level_within(pyramid: list[_Grid], limit: int) -> int:
+def _level_within(grids: list[Grid], limit: int) -> int:
     """Return the finest level of at most `limit` vertices a side; the coarsest if none is as small."""
-    return next(level for level, grid in enumerate(pyramid) if max(grid.shape) <= limit or level == len(pyramid) - 1)
+    return next(level for level, grid in enumerate(grids) if max(grid.shape) <= limit or level == len(grids) - 1)
 
 
-def _started(pyramid: list[_Grid], uniform: Hierarchy, start: int) -> Floats:
-    """Lay out level `start` conformally and refine it to the finest, not yet settled there: places (R, C, 2) [mm]."""
-    x = conformal_start(pyramid[start].rest)
+def _started(grids: list[Grid], uniform: Hierarchy, start: int) -> Floats:
+    """Lay out level `start` conformally and refine it to the finest, not yet settled there: places, framed [mm]."""
+    x = framed(conformal_start(grids[start].rest))
     for level in range(start, 0, -1):
-        grid = pyramid[level]
-        springs = Springs(grid.rest, spring_constants(grid.shape, 1.0))
+        grid = grids[level]
+        springs = Springs(grid.rest, grid.k_s)
         x = _settle(x, springs, uniform, level, _COARSE_TOLERANCE * springs.rest_mean, _COARSE_ITERATIONS).x
-        x = interpolated(x, pyramid[level - 1].shape)
+        x = refined(x, grids[level - 1])
     return x
 
 
 def _settle(x: Floats, springs: Springs, solver: Hierarchy, at: int, tolerance: float, most: int) -> Iterated:
     """Bring springs to rest by local and global steps, the latter a multigrid cycle from level `at` of `solver`."""
     level, k_s = solver.levels[at], springs.k_s
-    framed = np.zeros((x.shape[0] + 2, x.shape[1] + 2, 2))
-    framed[1:-1, 1:-1] = x
+    pull = np.empty((2, springs.grid[1]))
 
     def local_global(places: Floats) -> Floats:
-        flat_forces(places, springs.rest, k_s, level.force)
+        flat_forces(places, springs.rest, k_s, pull, level.force)
         v_cycle(solver, at)
-        return np.asarray(places + _OVER * level.correction)
+        return np.asarray(moved(places, level.correction, _OVER))
 
-    found = accelerate(local_global, framed, tolerance, most)
-    return found._replace(x=np.ascontiguousarray(found.x[1:-1, 1:-1]))
-
-
-def _handedness(vertices: Floats) -> float:
-    """-1 if a grid's columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored.
-
-    A sheet rolled by more than half a turn shows some of its back, but never as much as a quarter of its area.
-    """
-    across, down = vertices[1:, 1:] - vertices[:-1, :-1], vertices[1:, :-1] - vertices[:-1, 1:]
-    # Twice a quad's area is the cross product of its diagonals.
-    normals = np.cross(across, down)
-    seen = float(normals[..., 2].sum())
-    return 1.0 if seen > _UPSIDE_DOWN * float(np.sqrt(np.einsum("ijk,ijk->ij", normals, normals)).sum()) else -1.0
-
-
-def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
-    """Turn and move flat places to where the sheet is as seen from above.
-
-    Parameters
-    ----------
-    places : (..., 2) array
-        Flattened [mm].
-    vertices : (..., 3) array
-        The sheet [mm].
-    mirror : float
-        -1 to turn the flat sheet over first.
-
-    Returns
-    -------
-    (..., 3) array
-        With z = 0 [mm].
-    """
-    p = places - places.reshape(-1, 2).mean(axis=0)
-    p[..., 1] *= mirror
-    middle = vertices[..., :2].reshape(-1, 2).mean(axis=0)
-    px, py, qx, qy = p[..., 0], p[..., 1], vertices[..., 0] - middle[0], vertices[..., 1] - middle[1]
-    angle = np.arctan2(float((px * qy - py * qx).sum()), float((px * qx + py * qy).sum()))
-    flat = np.zeros(vertices.shape)
-    flat[..., 0] = np.cos(angle) * px - np.sin(angle) * py + middle[0]
-    flat[..., 1] = np.sin(angle) * px + np.cos(angle) * py + middle[1]
-    return flat
+    return accelerate(local_global, x, tolerance, most)
