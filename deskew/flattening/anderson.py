@@ -15,11 +15,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from deskew.types import Floats
 
-MEMORY = 5
-_GROWTH = 1.0  # residuals may grow by this factor before the memory is thrown away
+MEMORY = 4
+_CHUNK = 2048  # entries of a vector worked on at a time
 
 
 class Iterated(NamedTuple):
@@ -63,34 +64,79 @@ def accelerate(
     """
     shape, size = x.shape, x.size
     d_residuals, d_images = np.empty((memory, size)), np.empty((memory, size))
-    gram = np.zeros((memory, memory))
-    kept, slot = 0, 0
-    last_image: Floats = np.empty(0)
-    last_residual: Floats = np.empty(0)
-    last_norm = np.inf
-    point = x
+    last_image, last_residual = np.empty(size), np.empty(size)
+    gram, products = np.zeros((memory, memory)), np.zeros(memory)
+    kept = slot = 0
+    last_norm, fresh, largest = np.inf, True, np.inf
+    point = x.ravel()
     for n in range(1, max_iterations + 1):
-        image = g(point).ravel()
-        residual = image - point.ravel()
-        largest, norm = float(np.abs(residual).max()), float(residual @ residual)
-        if largest <= tolerance or not np.isfinite(norm):
-            return Iterated(image.reshape(shape), n, largest, largest <= tolerance)
-        if norm > _GROWTH * last_norm:
-            kept = slot = 0
-            last_norm = np.inf
-            point = last_image.reshape(shape)
+        image = g(point.reshape(shape)).ravel()
+        largest, norm = _distance(image, point)
+        finite = bool(np.isfinite(norm))  # NaN is larger than nothing, `largest` included
+        if largest <= tolerance or not finite:
+            return Iterated(image.reshape(shape), n, largest, finite)
+        if norm > last_norm:
+            kept, slot, last_norm = 0, 0, np.inf
+            point = last_image.copy()
             continue
-        if last_residual.size:
-            d_residuals[slot] = residual - last_residual
-            d_images[slot] = image - last_image
-            kept = min(kept + 1, memory)
-            gram[slot, :kept] = gram[:kept, slot] = d_residuals[:kept] @ d_residuals[slot]
-            slot = (slot + 1) % memory
-        last_image, last_residual, last_norm = image, residual, norm
-        point = image.reshape(shape)
+        kept = 0 if fresh else min(kept + 1, memory)
+        _remember(image, point, last_image, last_residual, d_residuals, d_images, slot, kept, gram, products)
+        slot = slot if fresh else (slot + 1) % memory
+        last_norm, fresh = norm, False
         if kept:
             G = gram[:kept, :kept]
             ridge = 1e-12 * float(np.trace(G)) + 1e-300
-            shares = np.linalg.solve(G + ridge * np.eye(kept), d_residuals[:kept] @ residual)
-            point = (image - shares @ d_images[:kept]).reshape(shape)
+            shares = np.linalg.solve(G + ridge * np.eye(kept), products[:kept])
+            point = _combined(image, d_images, shares)
+        else:
+            point = image
     return Iterated(last_image.reshape(shape), max_iterations, largest, False)
+
+
+@njit(cache=True, error_model="numpy")
+def _distance(image: Floats, point: Floats) -> tuple[float, float]:
+    """Largest and summed squared difference of two vectors."""
+    largest, norm = 0.0, 0.0
+    for i in range(len(image)):
+        d = abs(image[i] - point[i])
+        largest = max(largest, d)
+        norm += d * d
+    return largest, norm
+
+
+@njit(cache=True, error_model="numpy")
+def _remember(image, point, last_image, last_residual, d_residuals, d_images, slot, kept, gram, products):  # type: ignore[no-untyped-def]
+    """Take the differences to the last evaluation into row `slot`, and every product that the next step needs.
+
+    One pass in chunks that stay in the cache, since what it costs is memory. With nothing `kept` only the evaluation
+    itself is noted.
+    """
+    gram_row = np.zeros(len(gram))
+    products[:] = 0.0
+    for start in range(0, len(image), _CHUNK):
+        stop = min(start + _CHUNK, len(image))
+        for i in range(start, stop):
+            residual = image[i] - point[i]
+            if kept > 0:
+                d_residuals[slot, i] = residual - last_residual[i]
+                d_images[slot, i] = image[i] - last_image[i]
+            last_residual[i] = residual
+            last_image[i] = image[i]
+        for k in range(kept):
+            a = np.dot(d_residuals[k, start:stop], d_residuals[slot, start:stop])
+            b = np.dot(d_residuals[k, start:stop], last_residual[start:stop])
+            gram_row[k] += a
+            products[k] += b
+    for k in range(kept):
+        gram[slot, k] = gram_row[k]
+        gram[k, slot] = gram_row[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _combined(image, d_images, shares):  # type: ignore[no-untyped-def]
+    """Return the image less the shares of the differences."""
+    point = image.copy()
+    for k in range(len(shares)):
+        for i in range(len(image)):
+            point[i] -= shares[k] * d_images[k, i]
+    return point

@@ -4,7 +4,9 @@ Every spring of stiffness k between vertices a and b adds k (e_a - e_b)(e_a - e_
 shear springs that is a nine-point stencil, which stays one on every coarser level (Galerkin, bilinear interpolation).
 One V-cycle, a symmetric Gauss-Seidel sweep on the way down and one on the way up, stands for the matrix's inverse.
 
-A level keeps its arrays in a frame of one empty vertex all around, so that no loop asks where the grid ends. Each
+A level keeps its arrays in a frame of one empty vertex all around, so that no loop asks where the grid ends, and each
+coordinate in an array of its own. A cycle only has to be about right, since the next one corrects it; so it is done in
+single precision, which halves the memory that it has to move. Each
 vertex holds the weights of four of its springs: to the right, below, below right and below left.
 
 References
@@ -19,7 +21,6 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from deskew.flattening.relaxation import invert_diagonal, residual, sweep
 from deskew.types import Array, Floats
 
 # A level of at most this many vertices a side is solved by a dense inverse.
@@ -37,7 +38,7 @@ class Level:
         Stiffness of each vertex's springs to the right, below, below right and below left [kg/s^2].
     inverse : (R + 2, C + 2) array
         One over the diagonal; 0 in the frame and where no spring is.
-    correction, force, left : (R + 2, C + 2, 2) arrays
+    correction, force, left : (2, R + 2, C + 2) arrays
         Work: the correction x [mm], the right-hand side [mN] and its residual.
     """
 
@@ -92,10 +93,10 @@ def hierarchy(k_s: Floats) -> Hierarchy:
 
 
 def _level(weights: Floats) -> Level:
-    inverse = np.zeros(weights.shape[:2])
-    invert_diagonal(weights, inverse)
-    correction, force, left = np.zeros((3, *weights.shape[:2], 2))
-    return Level(weights, inverse, correction, force, left)
+    inverse = np.zeros(weights.shape[:2], np.float32)
+    _invert_diagonal(weights, inverse)
+    correction, force, left = np.zeros((3, 2, *weights.shape[:2]), np.float32)
+    return Level(weights.astype(np.float32), inverse, correction, force, left)
 
 
 def _coarsened(weights: Floats) -> Floats:
@@ -145,8 +146,19 @@ def _transpose(weights, turned):  # type: ignore[no-untyped-def]
                 turned[c - 1, r + 1, 3] = weights[r, c, 3]
 
 
+@njit(cache=True)
+def _invert_diagonal(weights, inverse):  # type: ignore[no-untyped-def]
+    for r in range(1, weights.shape[0] - 1):
+        for c in range(1, weights.shape[1] - 1):
+            total = (
+                weights[r, c, 0] + weights[r, c, 1] + weights[r, c, 2] + weights[r, c, 3]
+                + weights[r, c - 1, 0] + weights[r - 1, c, 1] + weights[r - 1, c - 1, 2] + weights[r - 1, c + 1, 3]
+            )  # fmt: skip
+            inverse[r, c] = 1.0 / total if total > 0.0 else 0.0
+
+
 @njit(cache=True, inline="always")
-def _shares(c, columns):  # type: ignore[no-untyped-def]
+def shares(c, columns):  # type: ignore[no-untyped-def]
     """Coarse columns that fine column c is interpolated from, and their shares."""
     if columns <= 3:
         return c, c, 1.0, 0.0
@@ -157,19 +169,6 @@ def _shares(c, columns):  # type: ignore[no-untyped-def]
     return c // 2, c // 2 + 1, 0.5, 0.5
 
 
-@njit(cache=True, inline="always")
-def _join(coarse, r1, c1, r2, c2, k):  # type: ignore[no-untyped-def]
-    """Add a spring of stiffness k between two coarse vertices (rows and columns without the frame)."""
-    if r1 == r2:
-        if c1 != c2:
-            coarse[r1 + 1, min(c1, c2) + 1, 0] += k
-    else:
-        if r1 > r2:
-            r1, c1, r2, c2 = r2, c2, r1, c1
-        family = 1 if c1 == c2 else (2 if c2 > c1 else 3)
-        coarse[r1 + 1, c1 + 1, family] += k
-
-
 @njit(cache=True)
 def _halve_columns(weights, columns, coarse):  # type: ignore[no-untyped-def]
     """Galerkin product with linear interpolation along the rows.
@@ -177,65 +176,135 @@ def _halve_columns(weights, columns, coarse):  # type: ignore[no-untyped-def]
     A spring k between a = sum p_i X_i and b = sum q_j X_j becomes k (p - q)(p - q)^T; as the shares of a and of b each
     sum to 1 this is again a set of springs, of stiffness -k (p - q)_i (p - q)_j.
     """
-    for r in range(weights.shape[0] - 2):
+    first, second = np.empty(columns, np.int64), np.empty(columns, np.int64)
+    share = np.empty(columns)
+    for c in range(columns):
+        first[c], second[c], _, share[c] = shares(c, columns)
+    for r in range(1, weights.shape[0] - 1):
+        for c in range(columns - 1):
+            # One end is a coarse vertex, or both are: what is left is the spring between two neighbours.
+            alone = share[c] == 0.0 and share[c + 1] == 0.0
+            coarse[r, first[c] + 1, RIGHT] += weights[r, c + 1, RIGHT] * (1.0 if alone else 0.25)
         for c in range(columns):
-            a0, a1, p0, p1 = _shares(c, columns)
-            for family in range(4):
-                k = weights[r + 1, c + 1, family]
+            a, p = first[c] + 1, share[c]
+            for family in range(1, 4):
+                k = weights[r, c + 1, family]
                 if k == 0.0:
                     continue
-                down = 0 if family == 0 else 1
-                other = c + 1 if family == 0 or family == 2 else (c if family == 1 else c - 1)
-                b0, b1, q0, q1 = _shares(other, columns)
-                if down == 0:
-                    # One end is a coarse vertex, or both are: what is left is the spring between two neighbours.
-                    share = 1.0 if p1 == 0.0 and q1 == 0.0 else 0.25
-                    _join(coarse, r, min(a0, b0), r, max(a1, b1), k * share)
-                    continue
-                s = r + 1
-                _join(coarse, r, a0, s, b0, k * p0 * q0)
-                if q1 != 0.0:
-                    _join(coarse, r, a0, s, b1, k * p0 * q1)
-                    _join(coarse, s, b0, s, b1, -k * q0 * q1)
-                if p1 != 0.0:
-                    _join(coarse, r, a1, s, b0, k * p1 * q0)
-                    _join(coarse, r, a0, r, a1, -k * p0 * p1)
-                    if q1 != 0.0:
-                        _join(coarse, r, a1, s, b1, k * p1 * q1)
+                other = c if family == DOWN else (c + 1 if family == DOWN_RIGHT else c - 1)
+                b, q = first[other] + 1, share[other]
+                _join_down(coarse, r, a, b, k * (1.0 - p) * (1.0 - q))
+                if q != 0.0:
+                    _join_down(coarse, r, a, b + 1, k * (1.0 - p) * q)
+                    coarse[r + 1, b, RIGHT] -= k * q * (1.0 - q)
+                if p != 0.0:
+                    _join_down(coarse, r, a + 1, b, k * p * (1.0 - q))
+                    coarse[r, a, RIGHT] -= k * p * (1.0 - p)
+                    if q != 0.0:
+                        _join_down(coarse, r, a + 1, b + 1, k * p * q)
+
+
+@njit(cache=True, inline="always")
+def _join_down(coarse, r, a, b, k):  # type: ignore[no-untyped-def]
+    """Add a spring of stiffness k from column a of row r to column b, at most one away, of the row below."""
+    coarse[r, a, DOWN if b == a else (DOWN_RIGHT if b > a else DOWN_LEFT)] += k
+
+
+@njit(cache=True)
+def _sweep(weights, inverse, x, f, forward):  # type: ignore[no-untyped-def]
+    """Give every vertex in turn the place that its neighbours and its force ask for."""
+    rows, columns = x.shape[1] - 2, x.shape[2] - 2
+    for row in range(rows):
+        r = row + 1 if forward else rows - row
+        for column in range(columns):
+            c = column + 1 if forward else columns - column
+            w0, w1, w2, w3 = weights[r, c, 0], weights[r, c, 1], weights[r, c, 2], weights[r, c, 3]
+            w4, w5 = weights[r, c - 1, 0], weights[r - 1, c, 1]
+            w6, w7 = weights[r - 1, c - 1, 2], weights[r - 1, c + 1, 3]
+            # The neighbour that was just moved comes last: everything else can be summed while it is.
+            last, next_, before = (w4, w0, c - 1) if forward else (w0, w4, c + 1)
+            after = c + 1 if forward else c - 1
+            d = inverse[r, c]
+            for k in range(2):
+                others = (
+                    f[k, r, c] + next_ * x[k, r, after]
+                    + w1 * x[k, r + 1, c] + w2 * x[k, r + 1, c + 1] + w3 * x[k, r + 1, c - 1]
+                    + w5 * x[k, r - 1, c] + w6 * x[k, r - 1, c - 1] + w7 * x[k, r - 1, c + 1]
+                )  # fmt: skip
+                x[k, r, c] = d * others + (d * last) * x[k, r, before]
+
+
+@njit(cache=True)
+def _residual(weights, x, f, left):  # type: ignore[no-untyped-def]
+    """Write what the correction x leaves of the force f, f - A x, into `left`."""
+    for r in range(1, x.shape[1] - 1):
+        for c in range(1, x.shape[2] - 1):
+            w0, w1, w2, w3 = weights[r, c, 0], weights[r, c, 1], weights[r, c, 2], weights[r, c, 3]
+            w4, w5 = weights[r, c - 1, 0], weights[r - 1, c, 1]
+            w6, w7 = weights[r - 1, c - 1, 2], weights[r - 1, c + 1, 3]
+            total = w0 + w1 + w2 + w3 + w4 + w5 + w6 + w7
+            for k in range(2):
+                left[k, r, c] = f[k, r, c] - total * x[k, r, c] + (
+                    w0 * x[k, r, c + 1] + w1 * x[k, r + 1, c] + w2 * x[k, r + 1, c + 1] + w3 * x[k, r + 1, c - 1]
+                    + w4 * x[k, r, c - 1] + w5 * x[k, r - 1, c] + w6 * x[k, r - 1, c - 1] + w7 * x[k, r - 1, c + 1]
+                )  # fmt: skip
 
 
 @njit(cache=True)
 def _restrict(left, force):  # type: ignore[no-untyped-def]
     """Hand each fine residual to the coarse vertices that its vertex is interpolated from (P^T)."""
-    rows, columns = left.shape[0] - 2, left.shape[1] - 2
+    rows, columns = left.shape[1] - 2, left.shape[2] - 2
     force[:] = 0.0
     for r in range(rows):
-        y0, y1, p0, p1 = _shares(r, rows)
+        y0, y1, p0, p1 = shares(r, rows)
         for c in range(columns):
-            x0, x1, q0, q1 = _shares(c, columns)
+            x0, x1, q0, q1 = shares(c, columns)
             for k in range(2):
-                value = left[r + 1, c + 1, k]
-                force[y0 + 1, x0 + 1, k] += p0 * q0 * value
+                value = left[k, r + 1, c + 1]
+                force[k, y0 + 1, x0 + 1] += p0 * q0 * value
                 if q1 != 0.0:
-                    force[y0 + 1, x1 + 1, k] += p0 * q1 * value
+                    force[k, y0 + 1, x1 + 1] += p0 * q1 * value
                 if p1 != 0.0:
-                    force[y1 + 1, x0 + 1, k] += p1 * q0 * value
+                    force[k, y1 + 1, x0 + 1] += p1 * q0 * value
                     if q1 != 0.0:
-                        force[y1 + 1, x1 + 1, k] += p1 * q1 * value
+                        force[k, y1 + 1, x1 + 1] += p1 * q1 * value
 
 
 @njit(cache=True)
-def _prolong(coarse, x):  # type: ignore[no-untyped-def]
-    """Add the coarse correction, bilinear between coarse vertices (P)."""
-    rows, columns = x.shape[0] - 2, x.shape[1] - 2
+def prolong(coarse, x):  # type: ignore[no-untyped-def]
+    """Add a coarse correction, bilinear between coarse vertices (P); both framed."""
+    rows, columns = x.shape[1] - 2, x.shape[2] - 2
     for r in range(rows):
-        y0, y1, p0, p1 = _shares(r, rows)
+        y0, y1, p0, p1 = shares(r, rows)
         for c in range(columns):
-            x0, x1, q0, q1 = _shares(c, columns)
+            x0, x1, q0, q1 = shares(c, columns)
             for k in range(2):
-                x[r + 1, c + 1, k] += p0 * (q0 * coarse[y0 + 1, x0 + 1, k] + q1 * coarse[y0 + 1, x1 + 1, k]) + p1 * (
-                    q0 * coarse[y1 + 1, x0 + 1, k] + q1 * coarse[y1 + 1, x1 + 1, k]
+                x[k, r + 1, c + 1] += p0 * (q0 * coarse[k, y0 + 1, x0 + 1] + q1 * coarse[k, y0 + 1, x1 + 1]) + p1 * (
+                    q0 * coarse[k, y1 + 1, x0 + 1] + q1 * coarse[k, y1 + 1, x1 + 1]
                 )
+
+
+@njit(cache=True)
+def moved(places, correction, share):  # type: ignore[no-untyped-def]
+    """Return places (2, R + 2, C + 2) moved by a share of a correction."""
+    out = np.empty_like(places)
+    for k in range(2):
+        for r in range(places.shape[1]):
+            for c in range(places.shape[2]):
+                out[k, r, c] = places[k, r, c] + share * correction[k, r, c]
+    return out
+
+
+def framed(places: Floats) -> Floats:
+    """Lay places (R, C, 2) out as the levels have them, (2, R + 2, C + 2)."""
+    out = np.zeros((2, places.shape[0] + 2, places.shape[1] + 2))
+    out[:, 1:-1, 1:-1] = np.moveaxis(places, -1, 0)
+    return out
+
+
+def unframed(places: Floats) -> Floats:
+    """Return framed places as (R, C, 2)."""
+    return np.ascontiguousarray(np.moveaxis(places[:, 1:-1, 1:-1], 0, -1))
 
 
 def v_cycle(hierarchy: Hierarchy, at: int = 0) -> None:
@@ -251,23 +320,14 @@ def v_cycle(hierarchy: Hierarchy, at: int = 0) -> None:
     level = hierarchy.levels[at]
     if at == len(hierarchy.levels) - 1:
         rows, columns = level.grid
-        force = np.ascontiguousarray(level.force[1:-1, 1:-1]).reshape(rows * columns, 2)
-        level.correction[1:-1, 1:-1] = (hierarchy.coarsest_inverse @ force).reshape(rows, columns, 2)
+        force = np.ascontiguousarray(level.force[:, 1:-1, 1:-1]).reshape(2, rows * columns)
+        level.correction[:, 1:-1, 1:-1] = (force @ hierarchy.coarsest_inverse).reshape(2, rows, columns)
         return
     below = hierarchy.levels[at + 1]
     level.correction[:] = 0.0
-    sweep(level.weights, level.inverse, level.correction, level.force, True)
-    residual(level.weights, level.correction, level.force, level.left)
+    _sweep(level.weights, level.inverse, level.correction, level.force, True)
+    _residual(level.weights, level.correction, level.force, level.left)
     _restrict(level.left, below.force)
     v_cycle(hierarchy, at + 1)
-    _prolong(below.correction, level.correction)
-    sweep(level.weights, level.inverse, level.correction, level.force, False)
-
-
-def interpolated(coarse: Floats, grid: tuple[int, int]) -> Floats:
-    """Interpolate places of a coarse level's vertices, (r, c, 2), to the next finer grid, (R, C, 2)."""
-    framed = np.zeros((coarse.shape[0] + 2, coarse.shape[1] + 2, 2))
-    framed[1:-1, 1:-1] = coarse
-    fine = np.zeros((grid[0] + 2, grid[1] + 2, 2))
-    _prolong(framed, fine)
-    return np.ascontiguousarray(fine[1:-1, 1:-1])
+    prolong(below.correction, level.correction)
+    _sweep(level.weights, level.inverse, level.correction, level.force, False)

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from deskew.errors import InputError, require
-from deskew.flattening.asseen import as_seen
 from deskew.flattening.conformal import signed_areas
 from deskew.flattening.edges import Indices, edges_of
 from deskew.flattening.meshes import faces_from_above
+from deskew.flattening.placement import as_seen
 from deskew.types import Flattened, Floats, Sheet, Status
 
 ARAP_ITERATIONS = 20

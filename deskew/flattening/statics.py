@@ -11,20 +11,28 @@ quads are counted at the end; if there are any, the search begins again from a f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from deskew.errors import require
 from deskew.flattening import energies
 from deskew.flattening.anderson import Iterated, accelerate
-from deskew.flattening.asseen import as_seen, is_upside_down
 from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.inside import flat_surface
 from deskew.flattening.laplace import laplacian
-from deskew.flattening.multigrid import Hierarchy, coarse_index, hierarchy, interpolated, v_cycle
+from deskew.flattening.multigrid import (
+    Hierarchy,
+    framed,
+    hierarchy,
+    moved,
+    unframed,
+    v_cycle,
+)
+from deskew.flattening.placement import as_seen, handedness
+from deskew.flattening.pyramid import Grid, pyramid, refined
 from deskew.flattening.settings import StaticSettings
 from deskew.flattening.springs import Springs, chord_lengths, grid_springs, spring_constants
 from deskew.types import Flattened, Floats, Sheet, Status
@@ -41,18 +49,6 @@ _SHORTEST_START = 1e-3  # of the mean spring: lengths across a cut count as no s
 
 _FOLDED = "{folded} quads are folded over: scan the page again with more vertices, or remove noise (`noise_mm`)."
 _UNSETTLED = "The springs are still moving after {n} iterations: raise `max_iterations` or `tolerance`."
-
-
-@dataclass(frozen=True, slots=True)
-class _Grid:
-    """One level: rest lengths (4, R, C) and vertices (R, C, 3) [mm]."""
-
-    rest: Floats
-    vertices: Floats
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        return self.rest.shape[1], self.rest.shape[2]
 
 
 def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
@@ -91,7 +87,7 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
         status, remedy = Status.FOLDED, _FOLDED.format(folded=folded)
     elif not found.converged:
         status, remedy = Status.LOCKED, _UNSETTLED.format(n=found.n_iterations)
-    flat = as_seen(found.x, sheet.vertices, -_handedness(sheet.vertices))
+    flat = as_seen(found.x, sheet.vertices, -handedness(sheet.vertices))
     inside = None if sheet.surface is None else flat_surface(sheet.surface, flat, sheet.refinement)
     return Flattened(flat, status, remedy, counters, inside)
 
@@ -106,7 +102,7 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
     coarse = Sheet(sheet.vertices[::n, ::n], surface=sheet.vertices)
     flat = flatten_grid(coarse, replace(settings, through=1))
     assert flat.surface is not None
-    folded = int(count_folded(flat.surface, np.zeros((shape[0] - 1, shape[1] - 1), bool), _handedness(sheet.vertices)))
+    folded = int(count_folded(flat.surface, np.zeros((shape[0] - 1, shape[1] - 1), bool), handedness(sheet.vertices)))
     counters = {**flat.counters, "folded_quads": float(folded)}
     if folded and flat.status is Status.AT_REST:
         return Flattened(flat.surface, Status.FOLDED, _FOLDED.format(folded=folded), counters)
@@ -115,19 +111,22 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
 
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:
     """Search from finer and finer starts until nothing is folded; return the best, its folded quads, the searches."""
+    k_max = springs.k_max
+    if k_max != 1.0:  # only ratios matter, and the levels are made for springs of constant 1
+        springs = Springs(springs.rest, springs.k_s / k_max)
     even = _is_even(springs)
-    # As stiff as the springs themselves: the steps that bring forces to rest are measured by it.
-    uniform = hierarchy(spring_constants(springs.grid, springs.k_max))
-    pyramid = _pyramid(sheet, springs, len(uniform.levels))
+    uniform = hierarchy(spring_constants(springs.grid, 1.0))
+    grids = _levels(sheet, springs, len(uniform.levels))
     solver = uniform if even and np.ptp(springs.k_s[springs.k_s > 0]) == 0 and not springs.cut.any() else None
-    starts = list(dict.fromkeys(_level_within(pyramid, limit) for limit in (*_STARTS, max(springs.grid))))
+    starts = list(dict.fromkeys(_level_within(grids, limit) for limit in (*_STARTS, max(springs.grid))))
     searches: list[tuple[Iterated, int]] = []
     for start in starts:
-        x = _started(pyramid, uniform, springs.k_max, start)
+        x = _started(grids, uniform, start)
         if even:
             found = _settle(x, springs, solver or hierarchy(springs.k_s), 0, tolerance, most)
+            found = found._replace(x=unframed(found.x))
         else:
-            found = _settle_uneven(x, springs, tolerance, most)
+            found = _settle_uneven(unframed(x), springs, tolerance, most)
         searches.append((found, int(count_folded(found.x, springs.cut, -1.0))))
         if not searches[-1][1]:
             break
@@ -140,72 +139,47 @@ def _is_even(springs: Springs) -> bool:
     return len(springs.rest) == 4 and float(there.max()) <= _EVEN * float(there.min())
 
 
-def _pyramid(sheet: Sheet, springs: Springs, n_levels: int) -> list[_Grid]:
-    """Levels from fine to coarse; a coarse spring is as long as the two that it spans.
-
-    Coarse levels know neither cuts nor stiffness: they only start the search.
-    """
+def _levels(sheet: Sheet, springs: Springs, n: int) -> list[Grid]:
+    """Return `n` levels of the sheet; they know neither cuts nor stiffness, since they only start the search."""
     rest = springs.rest[:4]
     if springs.cut.any():
         # Nothing asks the vertices across a cut to be distinct.
         chords = np.maximum(chord_lengths(sheet.vertices), _SHORTEST_START * springs.rest_mean)
         rest = np.where(rest > 0, rest, chords)
-    grids = [_Grid(rest, sheet.vertices)]
-    while len(grids) < n_levels:
-        grids.append(_coarser(grids[-1]))
-    return grids
+    return pyramid(rest, sheet.vertices, n)
 
 
-def _coarser(fine: _Grid) -> _Grid:
-    rows, columns = (coarse_index(n) for n in fine.shape)
-    vertices = np.ascontiguousarray(fine.vertices[np.ix_(rows, columns)])
-    rest = chord_lengths(vertices)
-    rest[0, :, :-1] = np.add.reduceat(fine.rest[0][rows, :-1], columns[:-1], axis=1)
-    rest[1, :-1, :] = np.add.reduceat(fine.rest[1][:-1, columns], rows[:-1], axis=0)
-    # Where a side has an even number of vertices its last step is short, and no fine diagonals span that quad.
-    r, c = (int((np.diff(index) == 2).sum()) for index in (rows, columns))
-    falling, rising = fine.rest[2], fine.rest[3]
-    rest[2, :r, :c] = falling[0 : 2 * r : 2, 0 : 2 * c : 2] + falling[1 : 2 * r : 2, 1 : 2 * c : 2]
-    rest[3, :r, :c] = rising[1 : 2 * r : 2, 0 : 2 * c : 2] + rising[0 : 2 * r : 2, 1 : 2 * c : 2]
-    return _Grid(rest, vertices)
-
-
-def _level_within(pyramid: list[_Grid], limit: int) -> int:
+def _level_within(grids: list[Grid], limit: int) -> int:
     """Return the finest level of at most `limit` vertices a side; the coarsest if none is as small."""
-    return next(level for level, grid in enumerate(pyramid) if max(grid.shape) <= limit or level == len(pyramid) - 1)
+    return next(level for level, grid in enumerate(grids) if max(grid.shape) <= limit or level == len(grids) - 1)
 
 
-def _started(pyramid: list[_Grid], uniform: Hierarchy, k_s: float, start: int) -> Floats:
-    """Lay out level `start` conformally and refine it to the finest, not yet settled there: places (R, C, 2) [mm].
-
-    `uniform` holds the levels of a grid whose springs all have the constant `k_s`.
-    """
-    x = conformal_start(pyramid[start].rest)
+def _started(grids: list[Grid], uniform: Hierarchy, start: int) -> Floats:
+    """Lay out level `start` conformally and refine it to the finest, not yet settled there: places, framed [mm]."""
+    x = framed(conformal_start(grids[start].rest))
     for level in range(start, 0, -1):
-        grid = pyramid[level]
-        springs = Springs(grid.rest, spring_constants(grid.shape, k_s))
+        grid = grids[level]
+        springs = Springs(grid.rest, grid.k_s)
         x = _settle(x, springs, uniform, level, _COARSE_TOLERANCE * springs.rest_mean, _COARSE_ITERATIONS).x
-        x = interpolated(x, pyramid[level - 1].shape)
+        x = refined(x, grids[level - 1])
     return x
 
 
 def _settle(x: Floats, springs: Springs, solver: Hierarchy, at: int, tolerance: float, most: int) -> Iterated:
     """Bring springs to rest by local and global steps, the latter a multigrid cycle from level `at` of `solver`."""
     level, k_s = solver.levels[at], springs.k_s
-    framed = np.zeros((x.shape[0] + 2, x.shape[1] + 2, 2))
-    framed[1:-1, 1:-1] = x
+    pull = np.empty((2, springs.grid[1]))
 
     def local_global(places: Floats) -> Floats:
-        flat_forces(places, springs.rest, k_s, level.force)
+        flat_forces(places, springs.rest, k_s, pull, level.force)
         v_cycle(solver, at)
-        return np.asarray(places + _OVER * level.correction)
+        return np.asarray(moved(places, level.correction, _OVER))
 
-    found = accelerate(local_global, framed, tolerance, most)
-    return found._replace(x=np.ascontiguousarray(found.x[1:-1, 1:-1]))
+    return accelerate(local_global, x, tolerance, most)
 
 
 def _settle_uneven(x: Floats, springs: Springs, tolerance: float, most: int) -> Iterated:
-    """Bring springs to rest by Newton's method, whatever their stiffness and reach."""
+    """Bring springs to rest by Newton's method, whatever their stiffness and reach, from places (R, C, 2)."""
     model = _listed(springs)
     matrix = laplacian(model.ends, model.weights, x.shape[0] * x.shape[1])
     found = newton(model, matrix, x.reshape(-1, 2), tolerance, most)
@@ -217,10 +191,3 @@ def _listed(springs: Springs) -> energies.Springs:
     a, b, rest, k_s = springs.pairs()
     there = k_s > 0
     return energies.Springs(np.stack([a, b], axis=-1)[there], k_s[there], rest[there])
-
-
-def _handedness(vertices: Floats) -> float:
-    """-1 if a grid's columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored."""
-    across, down = vertices[1:, 1:] - vertices[:-1, :-1], vertices[1:, :-1] - vertices[:-1, 1:]
-    # Twice a quad's area is the cross product of its diagonals.
-    return 1.0 if is_upside_down(np.cross(down, across)) else -1.0

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from deskew.flattening.multigrid import coarse_index, coarse_size, hierarchy, interpolated, v_cycle
+from deskew.flattening.multigrid import coarse_index, coarse_size, framed, hierarchy, prolong, unframed, v_cycle
 from deskew.flattening.springs import Springs, spring_constants
 from deskew.types import Array
 
@@ -33,9 +33,9 @@ def test_cycles_solve_the_springs_laplacian(shape: tuple[int, int]) -> None:
     x = np.zeros_like(force)
     left = [np.linalg.norm(force)]
     for _ in range(12):
-        levels.levels[0].force[1:-1, 1:-1] = force - (matrix @ x.reshape(-1, 2)).reshape(x.shape)
+        levels.levels[0].force[:] = framed(force - (matrix @ x.reshape(-1, 2)).reshape(x.shape))
         v_cycle(levels)
-        x += levels.levels[0].correction[1:-1, 1:-1]
+        x += unframed(levels.levels[0].correction)
         left.append(float(np.linalg.norm(force - (matrix @ x.reshape(-1, 2)).reshape(x.shape))))
     assert 0 <= left[-1] < 1e-5 * left[0]
     # A geometric hierarchy gains a factor that does not depend on the grid: here four a cycle.
@@ -51,7 +51,9 @@ def test_coarse_matrix_is_the_galerkin_product(shape: tuple[int, int]) -> None:
     for i in range(n):
         unit = np.zeros((n, 2))
         unit[i] = 1.0
-        prolongation[:, i] = interpolated(unit.reshape(*coarse.grid, 2), fine.grid)[..., 0].ravel()
+        column = framed(np.zeros((*fine.grid, 2)))
+        prolong(framed(unit.reshape(*coarse.grid, 2)), column)
+        prolongation[:, i] = unframed(column)[..., 0].ravel()
     assert np.allclose(prolongation.sum(axis=1), 1.0)
     w = coarse.weights[1:-1, 1:-1]
     families = np.zeros((4, *coarse.grid))
@@ -73,6 +75,6 @@ def test_force_on_a_cut_off_vertex_is_left_alone() -> None:
     cut[3:5, 3:5] = True
     k_s = spring_constants((9, 9), 1.0, cut=cut)
     levels = hierarchy(k_s)
-    levels.levels[0].force[1:-1, 1:-1] = 1.0
+    levels.levels[0].force[:, 1:-1, 1:-1] = 1.0
     v_cycle(levels)
     assert np.isfinite(levels.levels[0].correction).all()

@@ -1,0 +1,93 @@
+"""Where a flattened sheet lies: at its mean place and turned as it was, as seen from above, never mirrored."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from deskew.types import Floats
+
+# Share of a sheet's area, as seen from above, that must show its back before it counts as mirrored or upside down.
+UPSIDE_DOWN = 0.25
+
+
+def handedness(vertices: Floats) -> float:
+    """Return -1 if columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored.
+
+    A sheet rolled by more than half a turn shows some of its back, but never as much as a quarter of its area.
+
+    Parameters
+    ----------
+    vertices : (R, C, 3) array
+        The sheet [mm].
+    """
+    seen, whole = _areas(np.ascontiguousarray(vertices, dtype=np.float64))
+    return 1.0 if seen > UPSIDE_DOWN * whole else -1.0
+
+
+def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
+    """Turn and move flat places to where the sheet is as seen from above.
+
+    Parameters
+    ----------
+    places : (..., 2) array
+        Flattened [mm].
+    vertices : (..., 3) array
+        The sheet [mm].
+    mirror : float
+        -1 to turn the flat sheet over first.
+
+    Returns
+    -------
+    (..., 3) array
+        With z = 0 [mm].
+    """
+    p, q = np.ascontiguousarray(places).reshape(-1, 2), np.ascontiguousarray(vertices).reshape(-1, 3)
+    centre, middle = p.mean(axis=0), q[:, :2].mean(axis=0)
+    dot, cross = _products(p, q, centre, middle, mirror)
+    angle = np.arctan2(cross, dot)
+    flat = np.zeros(q.shape)
+    _turn(p, centre, mirror, np.cos(angle), np.sin(angle), middle, flat)
+    return flat.reshape(vertices.shape)
+
+
+@njit(cache=True)
+def _areas(v):  # type: ignore[no-untyped-def]
+    """Sum twice the quads' areas, as seen from above and whole: the cross products of their diagonals."""
+    seen, whole = 0.0, 0.0
+    for r in range(v.shape[0] - 1):
+        for c in range(v.shape[1] - 1):
+            ax, ay, az = (
+                v[r + 1, c + 1, 0] - v[r, c, 0],
+                v[r + 1, c + 1, 1] - v[r, c, 1],
+                v[r + 1, c + 1, 2] - v[r, c, 2],
+            )
+            bx, by, bz = (
+                v[r + 1, c, 0] - v[r, c + 1, 0],
+                v[r + 1, c, 1] - v[r, c + 1, 1],
+                v[r + 1, c, 2] - v[r, c + 1, 2],
+            )
+            x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            seen += z
+            whole += np.sqrt(x * x + y * y + z * z)
+    return seen, whole
+
+
+@njit(cache=True)
+def _products(p, q, centre, middle, mirror):  # type: ignore[no-untyped-def]
+    """Sum the scalar and the cross products of centred pairs: Kabsch's rotation in the plane is their angle."""
+    dot, cross = 0.0, 0.0
+    for i in range(len(p)):
+        px, py = p[i, 0] - centre[0], mirror * (p[i, 1] - centre[1])
+        qx, qy = q[i, 0] - middle[0], q[i, 1] - middle[1]
+        dot += px * qx + py * qy
+        cross += px * qy - py * qx
+    return dot, cross
+
+
+@njit(cache=True)
+def _turn(p, centre, mirror, cosine, sine, middle, out):  # type: ignore[no-untyped-def]
+    for i in range(len(p)):
+        px, py = p[i, 0] - centre[0], mirror * (p[i, 1] - centre[1])
+        out[i, 0] = cosine * px - sine * py + middle[0]
+        out[i, 1] = sine * px + cosine * py + middle[1]
