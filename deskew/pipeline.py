@@ -198,10 +198,9 @@ def with_stiffness(scan: Scan, materials: StiffnessMap) -> Scan:
     """
     size = scan.camera.size
     require(materials.size == size, "stiffness map", f"have the white image's size {size}", materials.size)
-    v = scan.sheet.vertices
-    middles = 0.25 * (v[:-1, :-1] + v[:-1, 1:] + v[1:, :-1] + v[1:, 1:])
-    constants = materials.at(project(scan.camera, middles).reshape(-1, 2)).reshape(middles.shape[:2])
-    return replace(scan, sheet=replace(scan.sheet, stiffness=constants))
+    middles = flattening.middles(scan.sheet)
+    constants = materials.at(project(scan.camera, middles).reshape(-1, 2)).reshape(middles.shape[:-1])
+    return replace(scan, sheet=flattening.with_stiffness(scan.sheet, constants))
 
 
 def restore(

@@ -21,12 +21,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
+from deskew.flattening.edges import Indices, edges_of
 from deskew.types import Array, Floats
-
-Indices = npt.NDArray[np.int64]
 
 # The bearing behind an end may miss its fan of triangles by this share: a border is never quite straight.
 _MISS = 0.2
@@ -78,9 +76,8 @@ def rays_of(vertices: Floats, faces: Array, directions: Floats) -> Rays:
     """
     n = len(vertices)
     corners = np.ascontiguousarray(faces, dtype=np.int64)
-    pairs = np.sort(corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    keys = np.unique(pairs[:, 0] * n + pairs[:, 1])
-    edges = np.stack([keys // n, keys % n], axis=1)
+    edges = edges_of(corners).ends
+    keys = edges @ np.array([n, 1])
     order = np.argsort(corners.ravel(), kind="stable")
     starts = np.searchsorted(corners.ravel()[order], np.arange(n + 1))
     behind, shares = np.full((2 * len(edges), 2), -1), np.zeros((2 * len(edges), 2))

@@ -9,43 +9,23 @@ Teran et al., Robust quasistatic finite elements and flesh simulation, SCA 2005 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.sparse import coo_array, csc_array, kron
 
-from deskew.flattening.anderson import accelerate
+from deskew.flattening.anderson import Iterated, accelerate
 from deskew.flattening.energies import Energy
 from deskew.flattening.laplace import Laplacian, factor
 from deskew.types import Floats
 
-_RIDGE = 1e-9  # of the Laplacian's diagonal: neither moving nor turning the whole sheet costs anything
+_RIDGE = 1e-9  # of the Laplacian's diagonal: neither moving nor turning a whole piece costs anything
 _SHORTEST_STEP = 1e-6
 _PATIENCE = 300  # local and global steps after which Newton's method may have a try
 _LAST_STEPS = 20
 
 
-class Descent(NamedTuple):
-    """Where a descent came to.
-
-    Attributes
-    ----------
-    x : (V, 2) array
-        [mm].
-    n_iterations : int
-        Steps taken.
-    converged : bool
-        Whether the last step changed no coordinate by more than was asked for, or none could lower the energy.
-    """
-
-    x: Floats
-    n_iterations: int
-    converged: bool
-
-
 def minimise(
     model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int, *, uneven: bool = False
-) -> Descent:
+) -> Iterated:
     """Go down an energy until no coordinate changes by more than `step_mm` in a step.
 
     Parameters
@@ -64,45 +44,53 @@ def minimise(
         Whether the stiffness varies so strongly that only Newton's method will do.
     """
     if uneven:
-        return newton(model, system, start, step_mm, max_iterations)
-    found = local_global(model, system, start, step_mm, max_iterations)
+        return newton(model, system.matrix, start, step_mm, max_iterations)
+    # The best vectors of the edges, then the best places for them; the system was factored once.
+    found = accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, max_iterations)
     if found.converged or max_iterations < _PATIENCE or not np.isfinite(found.x).all():
         return found
     # Parts that are squeezed keep the steps circling; a line search does not circle.
-    last = newton(model, system, found.x, step_mm, _LAST_STEPS)
+    last = newton(model, system.matrix, found.x, step_mm, _LAST_STEPS)
     return last._replace(n_iterations=found.n_iterations + last.n_iterations)
 
 
-def local_global(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> Descent:
-    """Find the edges' best vectors, then the best places for them, until no coordinate changes by more than `step_mm`.
-
-    The system is factored once; every step solves it once.
-    """
-    found = accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, max_iterations)
-    return Descent(found.x, found.n_iterations, found.converged)
-
-
-def newton(model: Energy, system: Laplacian, start: Floats, step_mm: float, max_iterations: int) -> Descent:
+def newton(model: Energy, matrix: csc_array, start: Floats, step_mm: float, max_iterations: int) -> Iterated:
     """Newton's method on the positive part of the Hessian, with a line search, until a step is below `step_mm`.
 
-    Unlike local and global steps it does not mind a stiff part in a soft sheet, which turns as a whole.
+    Unlike local and global steps it does not mind a stiff part in a soft sheet, which turns as a whole. The sheet may
+    be in pieces.
+
+    Parameters
+    ----------
+    model : Energy
+        What to minimise.
+    matrix : (V, V) sparse array
+        Laplacian of the model's edges and weights.
+    start : (V, 2) array
+        [mm].
+    step_mm : float
+        Largest change of a coordinate that counts as none [mm].
+    max_iterations : int
+        Steps after which to give up, each one factorisation.
     """
-    L = system.matrix
-    both = kron(L, np.eye(2), format="csc")
-    x, value = start, model.value(start)
+    both = kron(matrix, np.eye(2), format="csc")
+    x, value, largest = start, model.value(start), np.inf
     for n in range(1, max_iterations + 1):
-        gradient = L @ x - model.pull(x)
+        gradient = matrix @ x - model.pull(x)
         move = _newton_move(model, both, x, gradient)
+        largest = float(np.abs(move).max())
+        if not np.isfinite(largest):
+            return Iterated(x, n, largest, False)
         slope = float((gradient * move).sum())
         length = 1.0
         while (there := model.value(x + length * move)) > value + 1e-4 * length * slope + 1e-13 * abs(value):
             length /= 2
             if length < _SHORTEST_STEP:
-                return Descent(x, n, slope > -1e-9 * abs(value))
+                return Iterated(x, n, largest, slope > -1e-9 * abs(value) or largest <= step_mm)
         x, value = x + length * move, there
-        if float(np.abs(move).max()) <= step_mm:
-            return Descent(x, n, True)
-    return Descent(x, max_iterations, False)
+        if largest <= step_mm:
+            return Iterated(x, n, largest, True)
+    return Iterated(x, max_iterations, largest, False)
 
 
 def _newton_move(model: Energy, both: csc_array, x: Floats, gradient: Floats) -> Floats:
@@ -115,6 +103,8 @@ def _newton_move(model: Energy, both: csc_array, x: Floats, gradient: Floats) ->
     rows, columns = np.repeat(unknowns, width, axis=1).ravel(), np.tile(unknowns, width).ravel()
     outer = (g[:, :, None] * g[:, None, :]).ravel()
     hessian = csc_array(both - csc_array(coo_array((outer, (rows, columns)), shape=both.shape)))
-    hessian.setdiag(hessian.diagonal() + _RIDGE * both.diagonal())
+    ridge = both.diagonal()
+    ridge[ridge == 0] = ridge.mean()  # a vertex without springs stays where it is
+    hessian.setdiag(hessian.diagonal() + _RIDGE * ridge)
     move = -factor(hessian).solve(gradient.ravel()).reshape(-1, 2)
     return np.asarray(move - move.mean(axis=0))

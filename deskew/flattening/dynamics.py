@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from deskew.errors import require
 from deskew.flattening.contact import Plane
+from deskew.flattening.flatforces import count_folded
 from deskew.flattening.forces import System, spring_energy, system
 from deskew.flattening.integrators import CONTACTS, EVALUATIONS, REJECTED, STEPS, Run, Scheme, advance, start
 from deskew.flattening.settings import ParticleSettings
@@ -77,17 +78,8 @@ def folded_quads(xy: Floats, cut: npt.NDArray[np.bool_] | None = None) -> int:
 
     Quads that are `cut`, (R - 1, C - 1), are none of the sheet and do not count.
     """
-    along, down = np.diff(xy, axis=1), np.diff(xy, axis=0)
-    corners = np.stack(
-        [
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-            for a in (along[:-1], along[1:])
-            for b in (down[:, :-1], down[:, 1:])
-        ]
-    )
-    if cut is not None:
-        corners = corners[:, ~cut]
-    return int((corners * np.sign(corners.sum()) <= 0).any(axis=0).sum())
+    none = np.zeros((xy.shape[0] - 1, xy.shape[1] - 1), dtype=np.bool_)
+    return min(int(count_folded(xy, none if cut is None else cut, up)) for up in (1.0, -1.0))
 
 
 def choose_constants(springs: Springs, x: Array, scheme: Scheme, settings: ParticleSettings) -> Constants:

@@ -18,8 +18,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from deskew.flattening.edges import Indices, edges_of
 from deskew.types import Array, Floats
 
 # Least altitude of a hinge's triangle over the mesh's mean edge: in a near-vertical wall it vanishes.
@@ -41,7 +41,7 @@ class Hinges(NamedTuple):
         Length of the edge across the direction [mm].
     """
 
-    vertices: npt.NDArray[np.int64]
+    vertices: Indices
     stencils: Floats
     jumps: Floats
     lengths: Floats
@@ -59,7 +59,7 @@ def hinges_of(vertices: Floats, faces: Array, directions: Floats) -> Hinges:
     directions : (V, 3) array
         Unit vectors along which the vertices may move.
     """
-    corners = _four_corners(faces, len(vertices))
+    corners = _four_corners(faces)
     # Relative to one corner: coordinates far from the origin would cancel badly.
     arms = vertices[corners[:, 1:]] - vertices[corners[:, :1]]
     mean_edge = float(np.linalg.norm(arms[:, 0], axis=1).mean()) if len(corners) else 0.0
@@ -80,13 +80,11 @@ def hinges_of(vertices: Floats, faces: Array, directions: Floats) -> Hinges:
     return Hinges(corners, stencils, jumps, lengths)
 
 
-def _four_corners(faces: Array, n_vertices: int) -> npt.NDArray[np.int64]:
-    """Find the ends of every edge that has two faces, and the corners opposite to it."""
-    far = np.ascontiguousarray(faces, dtype=np.int64).ravel()
-    start, end = faces[:, [1, 2, 0]].ravel().astype(np.int64), faces[:, [2, 0, 1]].ravel().astype(np.int64)
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    keys = low * n_vertices + high
-    order = np.argsort(keys, kind="stable")
-    first = np.flatnonzero(keys[order][1:] == keys[order][:-1])
-    one, other = order[first], order[first + 1]
-    return np.stack([low[one], high[one], far[one], far[other]], axis=1)
+def _four_corners(faces: Array) -> Indices:
+    """Find the ends of every edge that has two faces, in their order, and the corners opposite to it."""
+    edges, corners = edges_of(faces), np.asarray(faces, dtype=np.int64).ravel()
+    of_half = edges.of_face.ravel()
+    one = np.flatnonzero(edges.opposite > np.arange(len(of_half)))
+    one = one[np.argsort(of_half[one])]
+    far = [corners[half - half % 3 + (half + 2) % 3] for half in (one, edges.opposite[one])]
+    return np.column_stack([edges.ends[of_half[one]], *far])

@@ -26,6 +26,8 @@ from deskew.flattening.edges import Edges, Indices, edges_of
 from deskew.flattening.energies import ENERGIES, BuildEnergy, Energy
 from deskew.flattening.intrinsic import Triangles, bearings, triangles
 from deskew.flattening.laplace import Laplacian
+from deskew.flattening.placement import as_seen, is_upside_down
+from deskew.flattening.settings import MAX_STEPS
 from deskew.flattening.topology import Disc, disc_of
 from deskew.flattening.unfolding import unfold
 from deskew.types import Flattened, Floats, Sheet, Status
@@ -34,7 +36,6 @@ from deskew.types.arrays import require_numbers
 Measure = Callable[[Floats, Indices], Floats]
 
 _UNEVEN = 3.0  # ratio of stiffness beyond which Newton's method is used
-_UPSIDE_DOWN = 0.25  # a rolled sheet's projected area is never below -0.22 of its own, an overturned page's is near -1
 _FEW = 0.01  # share of faces turned over that is a local matter
 _STIFFEN, _ROUNDS = 5.0, 8
 _REMEDY = "smooth the surface or its noise, or cut it where it cannot lie flat"
@@ -65,7 +66,7 @@ def flatten_mesh(
     tolerance : float
         Largest change of a coordinate in a step that counts as none, as a share of the sheet's size, in (0, 0.01].
     max_iterations : int
-        Steps after which to give up on a start, in [1, 1e6].
+        Steps after which to give up on a start, in [1, 1e9].
 
     Returns
     -------
@@ -86,7 +87,7 @@ def flatten_mesh(
     """
     require(energy in ENERGIES, "energy", f"be one of {', '.join(ENERGIES)}", repr(energy))
     require_positive("tolerance", tolerance, 0.01)
-    require_whole("max_iterations", max_iterations, 1, 1_000_000)
+    require_whole("max_iterations", max_iterations, 1, MAX_STEPS)
     disc = disc_of(sheet)
     if callable(rest):
         lengths = rest(disc.vertices, disc.faces)
@@ -99,8 +100,7 @@ def flatten_mesh(
     stiffness = stiffness / stiffness.mean()
     step_mm = tolerance * float(np.ptp(disc.vertices, axis=0).max())
     found = _solve(plate, stiffness, ENERGIES[energy], step_mm, max_iterations)
-    placed = np.zeros((len(disc.vertices), 3))
-    placed[:, :2] = aligned(found.x, disc.vertices[:, :2])
+    placed = as_seen(found.x, disc.vertices)
     counters = {"iterations": float(found.iterations), "flips": float(found.flips), "energy": max(found.energy, 0.0)}
     counters |= disc.counts
     counters["healed_faces"] += plate.shapes.n_mended
@@ -158,7 +158,7 @@ def _solve(plate: _Plate, stiffness: Floats, build: BuildEnergy, step_mm: float,
     best: _Found | None = None
     iterations = 0
     for start in plate.starts(model, system):
-        x, n, converged = minimise(model, system, start, step_mm, max_iterations, uneven=uneven)
+        x, n, _, converged = minimise(model, system, start, step_mm, max_iterations, uneven=uneven)
         iterations += n
         flips = int(plate.turned_over(x).sum())
         if np.isfinite(x).all() and (best is None or flips < best.flips):
@@ -184,7 +184,7 @@ def _stiffened(
         stiffness = np.where(around, _STIFFEN * stiffness, stiffness)
         model = build(plate.shapes, plate.faces, plate.edges, stiffness)
         system = Laplacian(plate.edges.ends, model.weights, plate.n_vertices)
-        x, n, converged = minimise(model, system, found.x, step_mm, max_iterations)
+        x, n, _, converged = minimise(model, system, found.x, step_mm, max_iterations)
         if not np.isfinite(x).all():
             break
         flips = int(plate.turned_over(x).sum())
@@ -233,16 +233,4 @@ def faces_from_above(vertices: Floats, faces: Indices) -> Indices:
     A rolled sheet has no upper side; its faces stay as they are.
     """
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    seen, whole = float(normals[:, 2].sum()), float(np.linalg.norm(normals, axis=1).sum())
-    return np.ascontiguousarray(faces[:, ::-1]) if seen < -_UPSIDE_DOWN * whole else faces
-
-
-def aligned(x: Floats, onto: Floats) -> Floats:
-    """Turn and move points (V, 2) to fit others best, without a mirror."""
-    x, centre = x - x.mean(axis=0), onto.mean(axis=0)
-    target = onto - centre
-    turn = (x[:, 0] - 1j * x[:, 1]) @ (target[:, 0] + 1j * target[:, 1])
-    turn = turn / abs(turn) if abs(turn) > 0 else 1.0
-    c, s = turn.real, turn.imag
-    return np.asarray(x @ np.array([[c, s], [-s, c]]) + centre)
+    return np.ascontiguousarray(faces[:, ::-1]) if is_upside_down(np.cross(b - a, c - a)) else faces

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from deskew.flattening.directions import noise_directions
+from deskew.flattening.edges import edges_of
 from deskew.types import Array, Floats
 
 _GAUSS = 1.4826  # standard deviation of a normal variable over its median absolute deviation
@@ -71,9 +72,8 @@ def _laplacian(vertices: Floats, faces: Array, directions: Floats) -> tuple[csr_
         columns += [c, b, b, c]
         values += [weight, weight, -weight, -weight]
     entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    low, high = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1).T
-    keys, counts = np.unique(low * n + high, return_counts=True)
+    edges = edges_of(faces)
     border = np.zeros(n, dtype=np.bool_)
-    border[keys[counts == 1] // n] = border[keys[counts == 1] % n] = True
+    border[edges.ends[edges.of_face.ravel()[edges.opposite < 0]]] = True
     laplacian = diags_array((~border).astype(np.float64)) @ coo_array(entries, shape=(n, n)).tocsr()
     return csr_array(laplacian), border

@@ -19,7 +19,8 @@ import numpy as np
 from deskew.errors import InputError, require
 from deskew.flattening.conformal import signed_areas
 from deskew.flattening.edges import Indices, edges_of
-from deskew.flattening.meshes import aligned, faces_from_above
+from deskew.flattening.meshes import faces_from_above
+from deskew.flattening.placement import as_seen
 from deskew.types import Flattened, Floats, Sheet, Status
 
 ARAP_ITERATIONS = 20
@@ -122,14 +123,12 @@ def slim_places(vertices: Floats, faces: Indices, start: Floats, iterations: int
 def _answer(sheet: Sheet, places: Floats, faces: Indices, iterations: int) -> Flattened:
     """Lay libigl's places onto Z = 0 over the sheet, or say that they are of no use."""
     counters = {"iterations": float(iterations)}
-    out = np.zeros((len(places), 3))
     if not np.isfinite(places).all():
-        out[:] = np.nan
-        return Flattened(out.reshape(sheet.vertices.shape), Status.DIVERGED, _UNUSABLE, counters)
+        return Flattened(np.full(sheet.vertices.shape, np.nan), Status.DIVERGED, _UNUSABLE, counters)
     flips = int((signed_areas(places, faces) <= 0).sum())
-    out[:, :2] = aligned(places, sheet.vertices.reshape(-1, 3)[:, :2])
+    out = as_seen(places, sheet.vertices.reshape(-1, 3)).reshape(sheet.vertices.shape)
     status, remedy = (Status.FOLDED, _FOLDED.format(flips)) if flips else (Status.AT_REST, "")
-    return Flattened(out.reshape(sheet.vertices.shape), status, remedy, counters | {"flips": float(flips)})
+    return Flattened(out, status, remedy, counters | {"flips": float(flips)})
 
 
 def _mean_edge(places: Floats, faces: Indices) -> float:

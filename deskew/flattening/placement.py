@@ -1,4 +1,4 @@
-"""Where a flattened grid lies: at its mean place and turned as it was, as seen from above, never mirrored."""
+"""How a flat sheet lies on the plane: as the bent one is seen from above, neither moved, nor turned, nor mirrored."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ from numba import njit
 
 from deskew.types import Floats
 
-# Share of a sheet's area, as seen from above, that must show its back before its grid counts as mirrored.
-UPSIDE_DOWN = 0.25
+# Share of a sheet's area, as seen from above, that must show its back before it counts as upside down: a sheet rolled
+# by more than half a turn shows up to 0.22, an overturned page nearly all.
+_UPSIDE_DOWN = 0.25
+
+
+def is_upside_down(normals: Floats) -> bool:
+    """Whether a sheet mostly faces down, by its normals (..., 3), as long as their areas; a rolled one never does."""
+    areas = np.sqrt(np.einsum("...k,...k->...", normals, normals))
+    return float(normals[..., 2].sum()) < -_UPSIDE_DOWN * float(areas.sum())
 
 
 def handedness(vertices: Floats) -> float:
     """Return -1 if columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored.
-
-    A sheet rolled by more than half a turn shows some of its back, but never as much as a quarter of its area.
 
     Parameters
     ----------
@@ -22,7 +27,7 @@ def handedness(vertices: Floats) -> float:
         The sheet [mm].
     """
     seen, whole = _areas(np.ascontiguousarray(vertices, dtype=np.float64))
-    return 1.0 if seen > UPSIDE_DOWN * whole else -1.0
+    return 1.0 if seen > _UPSIDE_DOWN * whole else -1.0
 
 
 def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
@@ -30,42 +35,36 @@ def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
 
     Parameters
     ----------
-    places : (R, C, 2) array
+    places : (..., 2) array
         Flattened [mm].
-    vertices : (R, C, 3) array
+    vertices : (..., 3) array
         The sheet [mm].
     mirror : float
         -1 to turn the flat sheet over first.
 
     Returns
     -------
-    (R, C, 3) array
+    (..., 3) array
         With z = 0 [mm].
     """
-    centre, middle = places.reshape(-1, 2).mean(axis=0), vertices[..., :2].reshape(-1, 2).mean(axis=0)
-    dot, cross = _products(places, vertices, centre, middle, mirror)
+    p, q = places.reshape(-1, 2), vertices.reshape(-1, 3)
+    centre, middle = p.mean(axis=0), q[:, :2].mean(axis=0)
+    dot, cross = _products(p, q, centre, middle, mirror)
     angle = np.arctan2(cross, dot)
-    flat = np.zeros(vertices.shape)
-    _turn(places, centre, mirror, np.cos(angle), np.sin(angle), middle, flat)
-    return flat
+    flat = np.zeros(q.shape)
+    _turn(p, centre, mirror, np.cos(angle), np.sin(angle), middle, flat)
+    return flat.reshape(vertices.shape)
 
 
 @njit(cache=True)
 def _areas(v):  # type: ignore[no-untyped-def]
-    """Sum twice the quads' areas, as seen from above and whole: the cross products of their diagonals."""
+    """Sum twice the areas of a grid's quads, as seen from above and whole: the cross products of their diagonals."""
     seen, whole = 0.0, 0.0
     for r in range(v.shape[0] - 1):
         for c in range(v.shape[1] - 1):
-            ax, ay, az = (
-                v[r + 1, c + 1, 0] - v[r, c, 0],
-                v[r + 1, c + 1, 1] - v[r, c, 1],
-                v[r + 1, c + 1, 2] - v[r, c, 2],
-            )
-            bx, by, bz = (
-                v[r + 1, c, 0] - v[r, c + 1, 0],
-                v[r + 1, c, 1] - v[r, c + 1, 1],
-                v[r + 1, c, 2] - v[r, c + 1, 2],
-            )
+            ax, ay = v[r + 1, c + 1, 0] - v[r, c, 0], v[r + 1, c + 1, 1] - v[r, c, 1]
+            bx, by = v[r + 1, c, 0] - v[r, c + 1, 0], v[r + 1, c, 1] - v[r, c + 1, 1]
+            az, bz = v[r + 1, c + 1, 2] - v[r, c, 2], v[r + 1, c, 2] - v[r, c + 1, 2]
             x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
             seen += z
             whole += np.sqrt(x * x + y * y + z * z)
@@ -76,19 +75,17 @@ def _areas(v):  # type: ignore[no-untyped-def]
 def _products(p, q, centre, middle, mirror):  # type: ignore[no-untyped-def]
     """Sum the scalar and the cross products of centred pairs: Kabsch's rotation in the plane is their angle."""
     dot, cross = 0.0, 0.0
-    for r in range(p.shape[0]):
-        for c in range(p.shape[1]):
-            px, py = p[r, c, 0] - centre[0], mirror * (p[r, c, 1] - centre[1])
-            qx, qy = q[r, c, 0] - middle[0], q[r, c, 1] - middle[1]
-            dot += px * qx + py * qy
-            cross += px * qy - py * qx
+    for i in range(len(p)):
+        px, py = p[i, 0] - centre[0], mirror * (p[i, 1] - centre[1])
+        qx, qy = q[i, 0] - middle[0], q[i, 1] - middle[1]
+        dot += px * qx + py * qy
+        cross += px * qy - py * qx
     return dot, cross
 
 
 @njit(cache=True)
 def _turn(p, centre, mirror, cosine, sine, middle, out):  # type: ignore[no-untyped-def]
-    for r in range(p.shape[0]):
-        for c in range(p.shape[1]):
-            px, py = p[r, c, 0] - centre[0], mirror * (p[r, c, 1] - centre[1])
-            out[r, c, 0] = cosine * px - sine * py + middle[0]
-            out[r, c, 1] = sine * px + cosine * py + middle[1]
+    for i in range(len(p)):
+        px, py = p[i, 0] - centre[0], mirror * (p[i, 1] - centre[1])
+        out[i, 0] = cosine * px - sine * py + middle[0]
+        out[i, 1] = sine * px + cosine * py + middle[1]

@@ -16,19 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from deskew.errors import require
-from deskew.flattening import newton
+from deskew.flattening import energies
 from deskew.flattening.anderson import Iterated, accelerate
+from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.inside import flat_surface
-from deskew.flattening.multigrid import (
-    Hierarchy,
-    framed,
-    hierarchy,
-    moved,
-    unframed,
-    v_cycle,
-)
+from deskew.flattening.laplace import laplacian
+from deskew.flattening.multigrid import Hierarchy, framed, hierarchy, moved, unframed, v_cycle
 from deskew.flattening.placement import as_seen, handedness
 from deskew.flattening.pyramid import Grid, pyramid, refined
 from deskew.flattening.settings import StaticSettings
@@ -43,6 +38,7 @@ _OVER = 1.7
 _EVEN = 4.0
 # Smooth changes are the slowest to settle, and cheap on a coarse level: share of a vertex spacing that counts as none.
 _COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-4, 200
+_SHORTEST_START = 1e-3  # of the mean spring: lengths across a cut count as no shorter at the start
 
 _FOLDED = "{folded} quads are folded over: scan the page again with more vertices, or remove noise (`noise_mm`)."
 _UNSETTLED = "The springs are still moving after {n} iterations: raise `max_iterations` or `tolerance`."
@@ -73,7 +69,7 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     counters = {
         "iterations": float(found.n_iterations),
         "residual_mm": found.residual,
-        "spring_energy": newton.energy(found.x.reshape(-1, 2), newton.SpringList(*springs.pairs()))
+        "spring_energy": _listed(springs).value(found.x.reshape(-1, 2))
         if len(springs.rest) > 4
         else float(flat_energy(found.x, springs.rest, springs.k_s)),
         "folded_quads": float(folded),
@@ -107,27 +103,26 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
 
 
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:
-    """Search from finer and finer starts until nothing is folded; return the result, its folded quads, the searches."""
+    """Search from finer and finer starts until nothing is folded; return the best, its folded quads, the searches."""
     even = _is_even(springs)
     uniform = hierarchy(spring_constants(springs.grid, 1.0))
     grids = _levels(sheet, springs, len(uniform.levels))
-    solver = uniform if even and np.ptp(springs.k_s[springs.k_s > 0]) == 0 and not springs.cut.any() else None
+    # Only ratios matter; and single precision holds no constants of any size.
+    unit = replace(springs, k_s=springs.k_s / springs.k_max)
+    solver = uniform if np.array_equal(unit.k_s, spring_constants(springs.grid, 1.0)) else None
     starts = list(dict.fromkeys(_level_within(grids, limit) for limit in (*_STARTS, max(springs.grid))))
-    n_starts = 0
+    searches: list[tuple[Iterated, int]] = []
     for start in starts:
-        n_starts += 1
         x = _started(grids, uniform, start)
         if even:
-            found = _settle(x, springs, solver or hierarchy(springs.k_s), 0, tolerance, most)
+            found = _settle(x, unit, solver or hierarchy(unit.k_s), 0, tolerance, most)
             found = found._replace(x=unframed(found.x))
         else:
-            listed = newton.SpringList(*springs.pairs())
-            found = newton.minimise(unframed(x).reshape(-1, 2), listed, tolerance, most)
-            found = found._replace(x=found.x.reshape(*springs.grid, 2))
-        folded = int(count_folded(found.x, springs.cut, -1.0))
-        if not folded:
+            found = _settle_uneven(unframed(x), unit, tolerance, most)
+        searches.append((found, int(count_folded(found.x, springs.cut, -1.0))))
+        if not searches[-1][1]:
             break
-    return found, folded, n_starts
+    return *min(searches, key=lambda search: search[1]), len(searches)
 
 
 def _is_even(springs: Springs) -> bool:
@@ -140,7 +135,9 @@ def _levels(sheet: Sheet, springs: Springs, n: int) -> list[Grid]:
     """Return `n` levels of the sheet; they know neither cuts nor stiffness, since they only start the search."""
     rest = springs.rest[:4]
     if springs.cut.any():
-        rest = np.where(rest > 0, rest, chord_lengths(sheet.vertices))
+        # Nothing asks the vertices across a cut to be distinct.
+        chords = np.maximum(chord_lengths(sheet.vertices), _SHORTEST_START * springs.rest_mean)
+        rest = np.where(rest > 0, rest, chords)
     return pyramid(rest, sheet.vertices, n)
 
 
@@ -171,3 +168,18 @@ def _settle(x: Floats, springs: Springs, solver: Hierarchy, at: int, tolerance: 
         return np.asarray(moved(places, level.correction, _OVER))
 
     return accelerate(local_global, x, tolerance, most)
+
+
+def _settle_uneven(x: Floats, springs: Springs, tolerance: float, most: int) -> Iterated:
+    """Bring springs to rest by Newton's method, whatever their stiffness and reach."""
+    model = _listed(springs)
+    matrix = laplacian(model.ends, model.weights, x.shape[0] * x.shape[1])
+    found = newton(model, matrix, x.reshape(-1, 2), tolerance, most)
+    return found._replace(x=found.x.reshape(x.shape))
+
+
+def _listed(springs: Springs) -> energies.Springs:
+    """Springs of a grid as those of any mesh."""
+    a, b, rest, k_s = springs.pairs()
+    there = k_s > 0
+    return energies.Springs(np.stack([a, b], axis=-1)[there], k_s[there], rest[there])

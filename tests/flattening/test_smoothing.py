@@ -82,3 +82,8 @@ def test_order_and_pose_and_unit_do_not_matter():
     turn, shift = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]), np.array([200.0, -900.0, 40.0])
     np.testing.assert_allclose(denoise(scan @ turn + shift, faces, 0.3), smooth @ turn + shift, atol=3e-3)
     np.testing.assert_allclose(denoise(1e3 * scan, faces, 3e2), 1e3 * smooth, atol=3.0)
+
+
+def test_a_triangle_alone_has_nothing_to_be_smoothed_by():
+    triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]])
+    np.testing.assert_array_equal(denoise(triangle, np.array([[0, 1, 2]]), 0.1), triangle)

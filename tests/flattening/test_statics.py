@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 import deskew
 from deskew.errors import InputError
-from deskew.flattening import StaticSettings, flatten
+from deskew.flattening import StaticSettings, energies, flatten
+from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
+from deskew.flattening.laplace import laplacian
 from deskew.flattening.multigrid import framed, unframed
-from deskew.flattening.newton import SpringList, energy, minimise
 from deskew.flattening.settings import SpringSettings
 from deskew.flattening.springs import Springs, chord_lengths, grid_springs
 from deskew.types import Array, Sheet, Status
@@ -134,11 +135,13 @@ def test_any_grid_flattens(shape: tuple[int, int]) -> None:
 def test_multigrid_and_newton_find_the_same_minimum() -> None:
     sheet = Sheet(folded(2))
     quick = flatten(sheet, tolerance=1e-9)
-    springs = SpringList(*grid_springs(sheet, SpringSettings()).pairs())
-    exact = minimise(quick.vertices[..., :2].reshape(-1, 2), springs, 1e-8, 50)
+    a, b, rest, k_s = grid_springs(sheet, SpringSettings()).pairs()
+    springs = energies.Springs(np.stack([a, b], axis=-1), k_s, rest)
+    matrix = laplacian(springs.ends, k_s, SHAPE[0] * SHAPE[1])
+    exact = newton(springs, matrix, quick.vertices[..., :2].reshape(-1, 2), 1e-8, 50)
     assert exact.converged
     assert np.abs(exact.x.reshape(*SHAPE, 2) - quick.vertices[..., :2]).max() < 1e-5
-    assert quick.counters["spring_energy"] == pytest.approx(energy(exact.x, springs), rel=1e-9)
+    assert quick.counters["spring_energy"] == pytest.approx(springs.value(exact.x), rel=1e-9)
 
 
 def test_default_tolerance_is_within_a_thousandth_of_a_millimetre() -> None:
@@ -160,6 +163,17 @@ def test_any_ratio_of_stiffness_converges_to_where_no_force_is_left(ratio: float
     springs = grid_springs(Sheet(vertices, stiffness=stiffness), SpringSettings())
     force = forces(result.vertices[..., :2], springs)
     assert np.abs(force).max() < 1e-4 * max(1.0, ratio) * springs.rest_mean
+
+
+@pytest.mark.parametrize("k_s", [1e-9, 0.3, 7.0, 1e12])
+def test_constant_of_even_springs_changes_nothing_but_the_energy(k_s: float) -> None:
+    vertices = folded(4)
+    plain = flatten(Sheet(vertices))
+    by_map = Sheet(vertices, stiffness=np.full((SHAPE[0] - 1, SHAPE[1] - 1), k_s))
+    for result in (flatten(Sheet(vertices), k_s=k_s), flatten(by_map)):
+        assert result.counters["iterations"] == plain.counters["iterations"]
+        assert result.counters["spring_energy"] == pytest.approx(k_s * plain.counters["spring_energy"], rel=1e-6)
+        assert np.allclose(result.vertices, plain.vertices, atol=1e-6)
 
 
 def test_stiff_region_keeps_its_shape_and_the_soft_one_gives() -> None:
@@ -217,6 +231,28 @@ def test_sections_lay_a_coarse_grid_down_as_the_dense_one_would() -> None:
     assert np.allclose(through.vertices, section.surface)
 
 
+def test_sections_serve_the_other_energy_as_well() -> None:
+    dense, flat = mirror_folds(7, (133, 177))
+    coarse = Sheet(dense[::4, ::4], surface=dense)
+    errors = [
+        rigid_error(flatten(coarse, **{"energy": "arap"} | asked).vertices[..., :2], flat[::4, ::4]).mean()
+        for asked in ({"energy": "springs"}, {}, {"rest": "chord"})
+    ]
+    assert 0 < errors[1] < 1.2 * errors[0] < 0.15 * errors[2]
+    with pytest.raises(InputError, match="`noise_mm` must be 0 for a sheet with a surface"):
+        flatten(coarse, noise_mm="auto")
+
+
+def test_noise_of_a_grid_is_found_and_removed() -> None:
+    vertices, flat = mirror_folds(3, (90, 120))
+    vertices[..., 2] += np.random.default_rng(0).normal(0, 0.3, vertices.shape[:2])
+    blind, clean = deskew.flatten(vertices), deskew.flatten(vertices, noise_mm="auto")
+    assert clean.vertices.shape == vertices.shape
+    assert clean.counters["noise_estimated_mm"] == pytest.approx(0.3, rel=0.03)
+    assert 0 < rigid_error(clean.vertices[..., :2], flat).mean() < 0.1
+    assert rigid_error(blind.vertices[..., :2], flat).mean() > 0.5
+
+
 def test_wrong_ways_through_a_dense_grid_are_refused() -> None:
     with pytest.raises(InputError, match="`through` must divide both sides' 22 and 30 quads, got 4"):
         flatten(Sheet(folded(0)), through=4)
@@ -234,6 +270,19 @@ def test_cut_pieces_flatten_without_pulling_at_each_other() -> None:
     assert result.status is Status.AT_REST
     for part in (np.s_[:, :11], np.s_[:, 11:]):
         assert rigid_error(result.vertices[part][..., :2], flat[part][..., :2]).max() < 1e-3
+
+
+def test_vertices_inside_a_cut_may_be_loose_and_coincide() -> None:
+    vertices, flat = mirror_folds(3, (17, 17))
+    cut = np.zeros((16, 16), dtype=bool)
+    cut[3:9, 3:9] = True
+    vertices[4:9, 4:9] = vertices[6, 6]
+    held = np.ones((17, 17), dtype=bool)
+    held[4:9, 4:9] = False
+    for stiffness in (None, np.where(np.arange(16) < 8, 1.0, 100.0) * np.ones((16, 1))):
+        result = flatten(Sheet(vertices, stiffness=stiffness, cut=cut))
+        assert result.status is Status.AT_REST
+        assert 0 < rigid_error(result.vertices[held][:, None, :2], flat[held][:, None]).mean() < 0.5
 
 
 def test_conformal_start_of_a_developable_grid_is_its_development() -> None:
