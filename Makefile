@@ -11,7 +11,7 @@ JOBS ?= 2
 BIN := .venv/bin
 STAMP := .venv/.complete
 SOURCES := deskew data_synth experiments tests
-EXPERIMENTS := plane_accuracy corner_distance real_boards
+EXPERIMENTS := plane_accuracy corner_distance surfaces surfaces_noisy real_boards
 # Beyond the paper; they take as long again, so only the largest budget runs them.
 EXPERIMENTS += $(if $(filter full,$(BUDGET)),decoders textures ablations)
 
@@ -35,7 +35,8 @@ reproduce: $(EXPERIMENTS) ## run every experiment and regenerate reports/ (BUDGE
 .NOTPARALLEL:
 
 $(EXPERIMENTS): $(STAMP)
-	@$(BIN)/python -m experiments experiment=$@ budget=$(BUDGET) out=$(REPORTS)/$@ \
+	@$(BIN)/python -m experiments experiment=$(@:_noisy=) budget=$(BUDGET) out=$(REPORTS)/$@ \
+		$(if $(filter %_noisy,$@),surfaces.noise_mm=0.3) \
 		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)'))
 
 bench: $(STAMP) ## time every stage against a memory triad; writes out/speed/ (TRIALS=15 repeats more)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from deskew import pipeline
+from deskew.acquisition import DenoiseSettings, InkSettings, SweepSettings, settings_for_ink
 from deskew.errors import InputError
 from deskew.io import StiffnessMap
-from deskew.types import DepthMap, Pinhole, Scan, Sheet
+from deskew.recipes import BEST, PAPER, Recipe, recipe_for
+from deskew.types import DepthMap, PatternKind, Pinhole, Scan, Sheet
 
 
 @pytest.fixture
@@ -37,3 +42,34 @@ def test_a_map_of_another_size_is_refused(scan: Scan) -> None:
     wanted = r"`stiffness map` must have the white image's size \(26, 18\), got \(3, 2\)"
     with pytest.raises(InputError, match=wanted):
         pipeline.with_stiffness(scan, small)
+
+
+def test_only_the_papers_methods_are_scanned_as_the_paper_scans() -> None:
+    assert {name: recipe_for(name) for name in ("paper_euler", "paper_rk4", "spring", "arap", "own:press")} == {
+        "paper_euler": PAPER,
+        "paper_rk4": PAPER,
+        "spring": BEST,
+        "arap": BEST,
+        "own:press": BEST,
+    }
+    with pytest.raises(InputError, match="`mode` must be spatial or temporal, got 'both'"):
+        Recipe("both", ink=False, denoise=False)
+
+
+@pytest.mark.parametrize("pattern", list(PatternKind))
+def test_a_recipe_decides_how_a_pattern_is_decoded(pattern: PatternKind) -> None:
+    best, paper = pipeline.decoder_for(BEST, pattern), pipeline.decoder_for(PAPER, pattern)
+    if pattern is PatternKind.LINE_SWEEP:
+        assert (best, paper) == (SweepSettings(mode="temporal"), SweepSettings(mode="spatial"))
+    else:
+        assert (best, paper) == (settings_for_ink(pattern), None)
+
+
+@pytest.mark.parametrize(("recipe", "used"), [(BEST, True), (PAPER, False)])
+def test_a_recipe_decides_what_is_taken_out_of_a_scan(
+    monkeypatch: pytest.MonkeyPatch, recipe: Recipe, used: bool
+) -> None:
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr(pipeline, "scan", lambda capture, calibration, **settings: asked.update(settings))
+    pipeline.scan_by(recipe, SimpleNamespace(pattern=PatternKind.LINE_SWEEP), None)  # type: ignore[arg-type]
+    assert (asked["ink"], asked["denoise"]) == ((InkSettings(), DenoiseSettings()) if used else (None, None))

@@ -26,7 +26,7 @@ from deskew.flattening.edges import Edges, Indices, edges_of
 from deskew.flattening.energies import ENERGIES, BuildEnergy, Energy
 from deskew.flattening.intrinsic import Triangles, bearings, triangles
 from deskew.flattening.laplace import Laplacian
-from deskew.flattening.placement import UPSIDE_DOWN, as_seen
+from deskew.flattening.placement import as_seen, is_upside_down
 from deskew.flattening.settings import MAX_STEPS
 from deskew.flattening.topology import Disc, disc_of
 from deskew.flattening.unfolding import unfold
@@ -233,6 +233,4 @@ def faces_from_above(vertices: Floats, faces: Indices) -> Indices:
     A rolled sheet has no upper side; its faces stay as they are.
     """
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    seen, whole = float(normals[:, 2].sum()), float(np.linalg.norm(normals, axis=1).sum())
-    return np.ascontiguousarray(faces[:, ::-1]) if seen < -UPSIDE_DOWN * whole else faces
+    return np.ascontiguousarray(faces[:, ::-1]) if is_upside_down(np.cross(b - a, c - a)) else faces

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from deskew.flattening.relaxation import invert_diagonal, residual, sweep
 from deskew.types import Array, Floats
 
 # A level of at most this many vertices a side is solved by a dense inverse.
@@ -94,7 +95,7 @@ def hierarchy(k_s: Floats) -> Hierarchy:
 
 def _level(weights: Floats) -> Level:
     inverse = np.zeros(weights.shape[:2], np.float32)
-    _invert_diagonal(weights, inverse)
+    invert_diagonal(weights, inverse)
     correction, force, left = np.zeros((3, 2, *weights.shape[:2]), np.float32)
     return Level(weights.astype(np.float32), inverse, correction, force, left)
 
@@ -144,17 +145,6 @@ def _transpose(weights, turned):  # type: ignore[no-untyped-def]
             # Joins (r, c) and (r + 1, c - 1): turned, (c - 1, r + 1) and, below left of it, (c, r).
             if weights[r, c, 3] != 0.0:
                 turned[c - 1, r + 1, 3] = weights[r, c, 3]
-
-
-@njit(cache=True)
-def _invert_diagonal(weights, inverse):  # type: ignore[no-untyped-def]
-    for r in range(1, weights.shape[0] - 1):
-        for c in range(1, weights.shape[1] - 1):
-            total = (
-                weights[r, c, 0] + weights[r, c, 1] + weights[r, c, 2] + weights[r, c, 3]
-                + weights[r, c - 1, 0] + weights[r - 1, c, 1] + weights[r - 1, c - 1, 2] + weights[r - 1, c + 1, 3]
-            )  # fmt: skip
-            inverse[r, c] = 1.0 / total if total > 0.0 else 0.0
 
 
 @njit(cache=True, inline="always")
@@ -208,46 +198,6 @@ def _halve_columns(weights, columns, coarse):  # type: ignore[no-untyped-def]
 def _join_down(coarse, r, a, b, k):  # type: ignore[no-untyped-def]
     """Add a spring of stiffness k from column a of row r to column b, at most one away, of the row below."""
     coarse[r, a, DOWN if b == a else (DOWN_RIGHT if b > a else DOWN_LEFT)] += k
-
-
-@njit(cache=True)
-def _sweep(weights, inverse, x, f, forward):  # type: ignore[no-untyped-def]
-    """Give every vertex in turn the place that its neighbours and its force ask for."""
-    rows, columns = x.shape[1] - 2, x.shape[2] - 2
-    for row in range(rows):
-        r = row + 1 if forward else rows - row
-        for column in range(columns):
-            c = column + 1 if forward else columns - column
-            w0, w1, w2, w3 = weights[r, c, 0], weights[r, c, 1], weights[r, c, 2], weights[r, c, 3]
-            w4, w5 = weights[r, c - 1, 0], weights[r - 1, c, 1]
-            w6, w7 = weights[r - 1, c - 1, 2], weights[r - 1, c + 1, 3]
-            # The neighbour that was just moved comes last: everything else can be summed while it is.
-            last, next_, before = (w4, w0, c - 1) if forward else (w0, w4, c + 1)
-            after = c + 1 if forward else c - 1
-            d = inverse[r, c]
-            for k in range(2):
-                others = (
-                    f[k, r, c] + next_ * x[k, r, after]
-                    + w1 * x[k, r + 1, c] + w2 * x[k, r + 1, c + 1] + w3 * x[k, r + 1, c - 1]
-                    + w5 * x[k, r - 1, c] + w6 * x[k, r - 1, c - 1] + w7 * x[k, r - 1, c + 1]
-                )  # fmt: skip
-                x[k, r, c] = d * others + (d * last) * x[k, r, before]
-
-
-@njit(cache=True)
-def _residual(weights, x, f, left):  # type: ignore[no-untyped-def]
-    """Write what the correction x leaves of the force f, f - A x, into `left`."""
-    for r in range(1, x.shape[1] - 1):
-        for c in range(1, x.shape[2] - 1):
-            w0, w1, w2, w3 = weights[r, c, 0], weights[r, c, 1], weights[r, c, 2], weights[r, c, 3]
-            w4, w5 = weights[r, c - 1, 0], weights[r - 1, c, 1]
-            w6, w7 = weights[r - 1, c - 1, 2], weights[r - 1, c + 1, 3]
-            total = w0 + w1 + w2 + w3 + w4 + w5 + w6 + w7
-            for k in range(2):
-                left[k, r, c] = f[k, r, c] - total * x[k, r, c] + (
-                    w0 * x[k, r, c + 1] + w1 * x[k, r + 1, c] + w2 * x[k, r + 1, c + 1] + w3 * x[k, r + 1, c - 1]
-                    + w4 * x[k, r, c - 1] + w5 * x[k, r - 1, c] + w6 * x[k, r - 1, c - 1] + w7 * x[k, r - 1, c + 1]
-                )  # fmt: skip
 
 
 @njit(cache=True)
@@ -325,9 +275,9 @@ def v_cycle(hierarchy: Hierarchy, at: int = 0) -> None:
         return
     below = hierarchy.levels[at + 1]
     level.correction[:] = 0.0
-    _sweep(level.weights, level.inverse, level.correction, level.force, True)
-    _residual(level.weights, level.correction, level.force, level.left)
+    sweep(level.weights, level.inverse, level.correction, level.force, True)
+    residual(level.weights, level.correction, level.force, level.left)
     _restrict(level.left, below.force)
     v_cycle(hierarchy, at + 1)
     prolong(below.correction, level.correction)
-    _sweep(level.weights, level.inverse, level.correction, level.force, False)
+    sweep(level.weights, level.inverse, level.correction, level.force, False)

@@ -1,4 +1,4 @@
-"""Where a flattened sheet lies: at its mean place and turned as it was, as seen from above, never mirrored."""
+"""How a flat sheet lies on the plane: as the bent one is seen from above, neither moved, nor turned, nor mirrored."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ from numba import njit
 
 from deskew.types import Floats
 
-# Share of a sheet's area, as seen from above, that must show its back before it counts as mirrored or upside down.
-UPSIDE_DOWN = 0.25
+# Share of a sheet's area, as seen from above, that must show its back before it counts as upside down: a sheet rolled
+# by more than half a turn shows up to 0.22, an overturned page nearly all.
+_UPSIDE_DOWN = 0.25
+
+
+def is_upside_down(normals: Floats) -> bool:
+    """Whether a sheet mostly faces down, by its normals (..., 3), as long as their areas; a rolled one never does."""
+    areas = np.sqrt(np.einsum("...k,...k->...", normals, normals))
+    return float(normals[..., 2].sum()) < -_UPSIDE_DOWN * float(areas.sum())
 
 
 def handedness(vertices: Floats) -> float:
     """Return -1 if columns and rows are as a page's, +X and -Y as seen from above; 1 if they are clearly mirrored.
-
-    A sheet rolled by more than half a turn shows some of its back, but never as much as a quarter of its area.
 
     Parameters
     ----------
@@ -22,7 +27,7 @@ def handedness(vertices: Floats) -> float:
         The sheet [mm].
     """
     seen, whole = _areas(np.ascontiguousarray(vertices, dtype=np.float64))
-    return 1.0 if seen > UPSIDE_DOWN * whole else -1.0
+    return 1.0 if seen > _UPSIDE_DOWN * whole else -1.0
 
 
 def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
@@ -42,7 +47,7 @@ def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
     (..., 3) array
         With z = 0 [mm].
     """
-    p, q = np.ascontiguousarray(places).reshape(-1, 2), np.ascontiguousarray(vertices).reshape(-1, 3)
+    p, q = places.reshape(-1, 2), vertices.reshape(-1, 3)
     centre, middle = p.mean(axis=0), q[:, :2].mean(axis=0)
     dot, cross = _products(p, q, centre, middle, mirror)
     angle = np.arctan2(cross, dot)
@@ -53,20 +58,13 @@ def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
 
 @njit(cache=True)
 def _areas(v):  # type: ignore[no-untyped-def]
-    """Sum twice the quads' areas, as seen from above and whole: the cross products of their diagonals."""
+    """Sum twice the areas of a grid's quads, as seen from above and whole: the cross products of their diagonals."""
     seen, whole = 0.0, 0.0
     for r in range(v.shape[0] - 1):
         for c in range(v.shape[1] - 1):
-            ax, ay, az = (
-                v[r + 1, c + 1, 0] - v[r, c, 0],
-                v[r + 1, c + 1, 1] - v[r, c, 1],
-                v[r + 1, c + 1, 2] - v[r, c, 2],
-            )
-            bx, by, bz = (
-                v[r + 1, c, 0] - v[r, c + 1, 0],
-                v[r + 1, c, 1] - v[r, c + 1, 1],
-                v[r + 1, c, 2] - v[r, c + 1, 2],
-            )
+            ax, ay = v[r + 1, c + 1, 0] - v[r, c, 0], v[r + 1, c + 1, 1] - v[r, c, 1]
+            bx, by = v[r + 1, c, 0] - v[r, c + 1, 0], v[r + 1, c, 1] - v[r, c + 1, 1]
+            az, bz = v[r + 1, c + 1, 2] - v[r, c, 2], v[r + 1, c, 2] - v[r, c + 1, 2]
             x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
             seen += z
             whole += np.sqrt(x * x + y * y + z * z)

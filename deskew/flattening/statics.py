@@ -23,14 +23,7 @@ from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.inside import flat_surface
 from deskew.flattening.laplace import laplacian
-from deskew.flattening.multigrid import (
-    Hierarchy,
-    framed,
-    hierarchy,
-    moved,
-    unframed,
-    v_cycle,
-)
+from deskew.flattening.multigrid import Hierarchy, framed, hierarchy, moved, unframed, v_cycle
 from deskew.flattening.placement import as_seen, handedness
 from deskew.flattening.pyramid import Grid, pyramid, refined
 from deskew.flattening.settings import StaticSettings
@@ -111,22 +104,21 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
 
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:
     """Search from finer and finer starts until nothing is folded; return the best, its folded quads, the searches."""
-    k_max = springs.k_max
-    if k_max != 1.0:  # only ratios matter, and the levels are made for springs of constant 1
-        springs = Springs(springs.rest, springs.k_s / k_max)
     even = _is_even(springs)
     uniform = hierarchy(spring_constants(springs.grid, 1.0))
     grids = _levels(sheet, springs, len(uniform.levels))
-    solver = uniform if even and np.ptp(springs.k_s[springs.k_s > 0]) == 0 and not springs.cut.any() else None
+    # Only ratios matter; and single precision holds no constants of any size.
+    unit = replace(springs, k_s=springs.k_s / springs.k_max)
+    solver = uniform if np.array_equal(unit.k_s, spring_constants(springs.grid, 1.0)) else None
     starts = list(dict.fromkeys(_level_within(grids, limit) for limit in (*_STARTS, max(springs.grid))))
     searches: list[tuple[Iterated, int]] = []
     for start in starts:
         x = _started(grids, uniform, start)
         if even:
-            found = _settle(x, springs, solver or hierarchy(springs.k_s), 0, tolerance, most)
+            found = _settle(x, unit, solver or hierarchy(unit.k_s), 0, tolerance, most)
             found = found._replace(x=unframed(found.x))
         else:
-            found = _settle_uneven(unframed(x), springs, tolerance, most)
+            found = _settle_uneven(unframed(x), unit, tolerance, most)
         searches.append((found, int(count_folded(found.x, springs.cut, -1.0))))
         if not searches[-1][1]:
             break
@@ -179,7 +171,7 @@ def _settle(x: Floats, springs: Springs, solver: Hierarchy, at: int, tolerance: 
 
 
 def _settle_uneven(x: Floats, springs: Springs, tolerance: float, most: int) -> Iterated:
-    """Bring springs to rest by Newton's method, whatever their stiffness and reach, from places (R, C, 2)."""
+    """Bring springs to rest by Newton's method, whatever their stiffness and reach."""
     model = _listed(springs)
     matrix = laplacian(model.ends, model.weights, x.shape[0] * x.shape[1])
     found = newton(model, matrix, x.reshape(-1, 2), tolerance, most)

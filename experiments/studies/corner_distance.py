@@ -54,7 +54,8 @@ class CornerDistance(Study):
         "Distance between the corners of the restored image and those of the control image, after an affine alignment "
         "as in the paper; rigid and dense figures, which no wrong scale can flatter, beside it. "
         "The paper gives its result in words, within half a pixel and within 0.25 mm: `within the paper's` is the "
-        "share of pages whose mean keeps both.",
+        "share of pages whose mean keeps both. `paper_*` are the paper's method as a whole, its scan included; `spring` "
+        "has the same mesh and springs, rest lengths along the corrected and filtered surface, and a static solution.",
         (
             Column("corner_mean_px", "mean [px]", 3, {"restored": f"< {_PAPER_PX}"}, headline=True),
             Column("corner_max_px", "max [px]", 3, headline=True),
@@ -194,7 +195,8 @@ class _Trial:
         for name in named:
             self.record.add("unrestored" if name == "-" else "restored", name, figures)
         if config.methods[0] in methods:
-            self._picture("model", model_view(scan.sheet.vertices))
+            seen = scan.sheet.vertices if scan.sheet.surface is None else scan.sheet.surface
+            self._picture("model", model_view(seen))
         return scan
 
     def _depth_figures(self, raw: DepthMap, filtered: DepthMap) -> dict[str, float]:

@@ -124,6 +124,28 @@ def test_a_stiffness_map_is_looked_up_by_texture(here: Path, deskew: Command, pa
     assert settings == {}
 
 
+def test_stiffness_decides_which_part_of_a_stretched_page_keeps_its_lengths(
+    here: Path, deskew: Command, page: Mesh
+) -> None:
+    """Noise that is left in, half of the page 40 times as stiff as the other: there the edges hold."""
+    rough = page.vertices + np.random.default_rng(0).normal(0, 0.3, page.vertices.shape)
+    assert page.texture is not None
+    write_mesh(Mesh(rough, page.faces, (page.texture - [0, -30]) / [40, 30]), here / "rough.obj")
+    line = "flatten rough.obj -o out/flat.ply --noise 0 --json"
+    strains = []
+    for option in ("", " --stiffness m.png"):
+        code, out, err = deskew(line + option)
+        assert (code, err, json.loads(out)["status"]) == (0, "", "at_rest")
+        flat = read_mesh(here / "out" / "flat.ply").vertices
+        sides = page.faces, np.roll(page.faces, 1, axis=1)
+        before, after = (np.linalg.norm(v[sides[0]] - v[sides[1]], axis=-1) for v in (rough, flat))
+        stiff = page.texture[page.faces].mean(axis=1)[:, 0] > 20
+        strains.append([np.abs(after / before - 1)[part].mean() for part in (stiff, ~stiff)])
+    (even, _), (stiff_part, soft_part) = strains
+    assert 0 < stiff_part < even
+    assert stiff_part < soft_part
+
+
 def test_what_is_flattened_can_be_scored(here: Path, deskew: Command, page: Mesh) -> None:
     """The truth comes along as texture and is no answer: x and y are, short of it by chords of 2 mm on 25 mm."""
     write_mesh(page, here / "truth.obj")

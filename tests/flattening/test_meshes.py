@@ -177,12 +177,14 @@ def test_stiff_part_keeps_its_size_when_the_rest_was_stretched(energy: str) -> N
     assert errors[0] > errors[1] > 10 * errors[2] > 0
 
 
-def test_rest_lengths_of_the_flat_sheet_give_the_flat_sheet() -> None:
+@pytest.mark.parametrize("energy", ["arap", "springs"])
+def test_rest_lengths_of_the_flat_sheet_give_the_flat_sheet(energy: str) -> None:
     edges = edges_of(F)
     rest = np.linalg.norm(FLAT[edges.ends[:, 1]] - FLAT[edges.ends[:, 0]], axis=1)
     for faces in (F, np.concatenate([F[:, (1, 2, 0)], F[:3]])):
-        found = flatten_mesh(Sheet(V, faces), rest=rest)
-        assert error_mm(found.vertices, FLAT).max() < 1e-6
+        for given_ in (rest, lambda vertices, faces: rest):
+            found = flatten_mesh(Sheet(V, faces), energy=energy, rest=given_)
+            assert error_mm(found.vertices, FLAT).max() < 1e-6
 
 
 def test_starts_in_reserve_fold_nothing() -> None:

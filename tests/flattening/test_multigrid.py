@@ -70,7 +70,7 @@ def test_coarse_grid_keeps_both_ends(n: int) -> None:
     assert set(np.diff(kept)) <= {1, 2}
 
 
-def test_force_on_a_cut_off_vertex_is_left_alone() -> None:
+def test_force_on_a_cut_off_vertex_breaks_nothing() -> None:
     cut = np.zeros((8, 8), dtype=bool)
     cut[3:5, 3:5] = True
     k_s = spring_constants((9, 9), 1.0, cut=cut)

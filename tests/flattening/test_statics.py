@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 import deskew
 from deskew.errors import InputError
-from deskew.flattening import StaticSettings, flatten
+from deskew.flattening import StaticSettings, energies, flatten
 from deskew.flattening.descent import newton
-from deskew.flattening.energies import Springs as EdgeSprings
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.laplace import laplacian
@@ -82,9 +81,7 @@ def test_roll_of_more_than_a_turn_unrolls() -> None:
     flat = np.stack(np.broadcast_arrays(u, -v[:, None]), axis=-1)
     result = flatten(Sheet(bent))
     assert result.status is Status.AT_REST
-    assert rigid_error(result.vertices[..., :2], flat).max() < 0.02 or (
-        rigid_error(result.vertices[..., :2] * [1, -1], flat).max() < 0.02
-    )
+    assert rigid_error(result.vertices[..., :2], flat).max() < 0.02
 
 
 def test_near_vertical_wall_lies_down() -> None:
@@ -137,7 +134,7 @@ def test_multigrid_and_newton_find_the_same_minimum() -> None:
     sheet = Sheet(folded(2))
     quick = flatten(sheet, tolerance=1e-9)
     a, b, rest, k_s = grid_springs(sheet, SpringSettings()).pairs()
-    springs = EdgeSprings(np.stack([a, b], axis=-1), k_s, rest)
+    springs = energies.Springs(np.stack([a, b], axis=-1), k_s, rest)
     matrix = laplacian(springs.ends, k_s, SHAPE[0] * SHAPE[1])
     exact = newton(springs, matrix, quick.vertices[..., :2].reshape(-1, 2), 1e-8, 50)
     assert exact.converged
@@ -338,7 +335,7 @@ def test_failing_function_of_stiffness_is_one_clear_error() -> None:
             deskew.flatten(folded(0), stiffness=function)
 
 
-def test_thread_count_and_order_of_calls_change_no_bit() -> None:
+def test_order_of_calls_changes_no_bit() -> None:
     vertices = folded(8)
     first = flatten(Sheet(vertices)).vertices
     flatten(Sheet(folded(9)))
