@@ -62,14 +62,19 @@ def _coarser(fine: Grid) -> Grid:
     rest = np.zeros_like(chords)
     rest[0, :, :-1] = np.add.reduceat(fine.rest[0][rows, :-1], columns[:-1], axis=1)
     rest[1, :-1, :] = np.add.reduceat(fine.rest[1][:-1, columns], rows[:-1], axis=0)
-    # A side of an even number of vertices ends in a short step, here or on the next level: no two fine diagonals span
-    # that quad, or two that do not follow each other straight.
-    short = (fine.short[0] or rows[-1] - rows[-2] == 1, fine.short[1] or columns[-1] - columns[-2] == 1)
-    r, c = len(rows) - 1 - short[0], len(columns) - 1 - short[1]
     rest[2:, :-1, :-1] = _diagonals(chords, rest)
-    falling, rising = fine.rest[2], fine.rest[3]
-    rest[2, :r, :c] = falling[0 : 2 * r : 2, 0 : 2 * c : 2] + falling[1 : 2 * r : 2, 1 : 2 * c : 2]
-    rest[3, :r, :c] = rising[1 : 2 * r : 2, 0 : 2 * c : 2] + rising[0 : 2 * r : 2, 1 : 2 * c : 2]
+    # A side of an even number of vertices ends in a short step, here or on the next level: no two fine diagonals span
+    # that quad, or two that do not follow each other straight. Nor do they where one side is too short to be halved.
+    halved = len(rows) < fine.shape[0], len(columns) < fine.shape[1]
+    short = (
+        fine.short[0] or (halved[0] and rows[-1] - rows[-2] == 1),
+        fine.short[1] or (halved[1] and columns[-1] - columns[-2] == 1),
+    )
+    r, c = len(rows) - 1 - short[0], len(columns) - 1 - short[1]
+    if all(halved):
+        falling, rising = fine.rest[2], fine.rest[3]
+        rest[2, :r, :c] = falling[0 : 2 * r : 2, 0 : 2 * c : 2] + falling[1 : 2 * r : 2, 1 : 2 * c : 2]
+        rest[3, :r, :c] = rising[1 : 2 * r : 2, 0 : 2 * c : 2] + rising[0 : 2 * r : 2, 1 : 2 * c : 2]
     quads = np.ones((len(rows) - 1, len(columns) - 1))
     quads[r:] *= _SHORT
     quads[:, c:] *= _SHORT

@@ -121,11 +121,14 @@ def test_transposed_grid_flattens_alike() -> None:
     assert np.allclose(other, flatten(Sheet(vertices)).vertices, atol=2e-3)
 
 
-@pytest.mark.parametrize("shape", [(2, 2), (2, 9), (3, 3), (7, 4), (2, 200), (90, 5), (64, 65)])
+@pytest.mark.parametrize(
+    "shape", [(2, 2), (2, 9), (3, 3), (7, 4), (2, 200), (90, 5), (64, 65), (3, 300), (300, 3), (9, 210)]
+)
 def test_any_grid_flattens(shape: tuple[int, int]) -> None:
     bent, flat = cylinder(60.0, shape)
     result = flatten(Sheet(bent))
     assert result.status is Status.AT_REST
+    assert result.counters["starts"] == 1
     chord = 60.0 * (100.0 / (shape[1] - 1) / 60.0) ** 3 / 24 * (shape[1] - 1)
     assert rigid_error(result.vertices[..., :2], flat).max() < 0.01 + chord
 
