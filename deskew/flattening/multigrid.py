@@ -5,9 +5,9 @@ shear springs that is a nine-point stencil, which stays one on every coarser lev
 One V-cycle, a symmetric Gauss-Seidel sweep on the way down and one on the way up, stands for the matrix's inverse.
 
 A level keeps its arrays in a frame of one empty vertex all around, so that no loop asks where the grid ends, and each
-coordinate in an array of its own. A cycle only has to be about right, since the next one corrects it; so it is done in
-single precision, which halves the memory that it has to move. Each
-vertex holds the weights of four of its springs: to the right, below, below right and below left.
+coordinate in an array of its own. Each vertex holds the weights of four of its springs: to the right, below, below
+right and below left. A cycle only has to be about right, since the next one corrects it; so it is done in single
+precision, which halves the memory that it has to move.
 
 References
 ----------

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TypeVar
+from numbers import Real
+from typing import TypeVar, cast
 
 from deskew.errors import require, require_whole
 from deskew.flattening.contact import READINGS
@@ -53,7 +54,9 @@ class StaticSettings:
     Attributes
     ----------
     k_s, rest, bending, more
-        As in `SpringSettings`, but `rest` is "section" unless asked for otherwise.
+        As in `SpringSettings`, but `rest` is "section" unless asked for otherwise. Where triangles are flattened (a
+        mesh, or a grid with noise or the other energy) `k_s` does not matter, and sections of what has no `surface` are
+        the lengths around its creases, see :mod:`.lengths`.
     energy : str or None
         "springs", or "arap": as rigid as possible on the same lengths. None: springs on a grid, and on a triangle mesh,
         whose springs do not resist being turned over, the other.
@@ -175,13 +178,13 @@ class ParticleSettings:
 
 def require_constant(name: str, value: object, unit: str) -> None:
     """Raise an InputError unless `value` is a number in [1e-9, 1e12], in `unit`."""
-    allowed = isinstance(value, int | float) and not isinstance(value, bool) and SMALLEST <= value <= LARGEST
+    allowed = _is_number(value) and SMALLEST <= cast(float, value) <= LARGEST
     require(allowed, name, f"be a number in [{SMALLEST:g}, {LARGEST:g}] [{unit}]", repr(value))
 
 
 def _is_number(value: object) -> bool:
     """Whether `value` is a number at all; its range is asked for where it is known, which NaN is outside of."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 Settings = TypeVar("Settings", ParticleSettings, StaticSettings)

@@ -33,7 +33,7 @@ _N_SHOWN = 5
 class CornerDistance(Study):
     """Crumpled checkerboards, scanned, flattened and restored: by the best method, and by the paper's.
 
-    A method comes with its way to scan (`deskew.pipeline.recipe_for`): the paper's as in the paper, all others with the
+    A method comes with its way to scan (`deskew.recipes.recipe_for`): the paper's as in the paper, all others with the
     ink corrected and the depth map filtered. What `scan.*` sets holds for all methods.
 
     Conditions
@@ -54,8 +54,9 @@ class CornerDistance(Study):
         "Distance between the corners of the restored image and those of the control image, after an affine alignment "
         "as in the paper; rigid and dense figures, which no wrong scale can flatter, beside it. "
         "The paper gives its result in words, within half a pixel and within 0.25 mm: `within the paper's` is the "
-        "share of pages whose mean keeps both. `paper_*` are the paper's method as a whole, its scan included; `spring` "
-        "has the same mesh and springs, rest lengths along the corrected and filtered surface, and a static solution.",
+        "share of pages whose mean keeps both. `paper_*` are the paper's method as a whole, its scan included; "
+        "`spring` has the same mesh and springs, rest lengths along the corrected and filtered surface, and a static "
+        "solution.",
         (
             Column("corner_mean_px", "mean [px]", 3, {"restored": f"< {_PAPER_PX}"}, headline=True),
             Column("corner_max_px", "max [px]", 3, headline=True),

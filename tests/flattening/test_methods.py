@@ -153,7 +153,8 @@ def test_restitution_may_be_anything_from_0_to_1(k_r: float) -> None:
 
 
 def test_mixed_numbers_of_numpy_are_numbers() -> None:
-    assert ParticleSettings(k_s=np.float64(2.0)).k_s == 2.0
+    assert ParticleSettings(k_s=np.float64(2.0), mass=np.float32(0.5)).k_s == 2.0
+    assert flatten(Sheet(flat_grid()), k_s=np.float32(2.0), noise_mm=np.int64(0)).status is Status.AT_REST
 
 
 @pytest.mark.parametrize("extreme", [{"k_s": 1e12}, {"k_s": 1e-9}, {"mass": 1e12}, {"mass": 1e-9}, {"dt": 1e12}])
