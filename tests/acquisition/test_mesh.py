@@ -98,6 +98,22 @@ def test_vertices_lie_on_a_curved_surface() -> None:
     assert np.abs(radius - 360.0).max() < 0.1
 
 
+@pytest.mark.parametrize("shape", [(12, 15), (20, 31), (60, 80)])
+def test_surface_is_the_mesh_sampled_about_every_other_pixel(shape: tuple[int, int]) -> None:
+    sheet = page_sheet(depth_map(cylinder_depth()), bowed_outline(), shape)
+    n = sheet.refinement
+    width_px = 140.0  # of the page in the picture
+    if sheet.surface is None:
+        assert width_px / (shape[1] - 1) < 3.0
+        return
+    assert n % 2 == 0
+    assert 1.0 < width_px / (shape[1] - 1) / n < 3.5
+    assert 0.3 < sheet.crease_width < 1.0
+    assert np.array_equal(sheet.surface[::n, ::n], sheet.vertices)
+    radius = np.hypot(sheet.surface[..., 0], sheet.surface[..., 2])
+    assert 0 < np.abs(radius[n:-n, n:-n] - 360.0).max() < 0.02
+
+
 def test_coons_grid_of_straight_sides_is_bilinear() -> None:
     outline = straight_outline(CORNERS)
     s, t = np.linspace(0, 1, 6), np.linspace(0, 1, 4)

@@ -10,6 +10,7 @@ from deskew import acquisition, metrics, pipeline, restoration
 from deskew.acquisition import DenoiseSettings, SweepSettings
 from deskew.errors import StepError
 from deskew.projection import centre
+from deskew.recipes import BEST
 from deskew.types import Status
 
 SEED = 20011  # no other test, experiment or development run uses it
@@ -105,6 +106,22 @@ def test_the_denoiser_brings_the_depth_of_a_printed_crumpled_page_closer_to_the_
     assert 0.03 < figures["depth_p95_mm"] < 0.16  # the ink is not corrected here: part of its bands passes
     assert 0.0 < np.abs(filtered.sheet.vertices - scan.sheet.vertices).max() < 5.0
     np.testing.assert_array_equal(filtered.depth.reason, scan.depth.reason)
+
+
+def test_the_best_recipe_restores_a_page_several_times_closer_than_the_papers(crumpled, calibration, scan):
+    capture, truth = crumpled
+    best = pipeline.scan_by(BEST, capture, calibration)
+    assert best.sheet.vertices.shape == scan.sheet.vertices.shape == (45, 45, 3)
+    errors = {}
+    for method, page in (("spring", best), ("paper_rk4", scan)):
+        restored = pipeline.restore(page, method=method)
+        assert restored.flattened.status is Status.AT_REST
+        uv = truth.page_at(restored.backward_map.astype(np.float64))
+        errors[method] = metrics.dense_error(restored, uv, PAGE.page_size_mm)
+    assert 0.005 < errors["spring"]["dense_mean_mm"] < 0.08
+    assert 0.01 < errors["spring"]["dense_p95_mm"] < 0.2
+    assert errors["spring"]["dense_mean_mm"] < 0.4 * errors["paper_rk4"]["dense_mean_mm"]
+    assert 0.995 < errors["spring"]["page_coverage"] <= 1.0
 
 
 def test_both_integrators_end_on_the_same_page(scan):

@@ -32,7 +32,14 @@ def scan(calibration: Calibration, depth: DepthMap) -> Scan:
         "white": rng.integers(0, 255, (8, 12), dtype=np.uint8),
         "raking": rng.integers(0, 65535, (20, 30, 3), dtype=np.uint16),
     }
-    sheet = Sheet(rng.normal(size=(3, 4, 3)), stiffness=rng.uniform(1, 2, (2, 3)), cut=np.eye(2, 3, dtype=bool))
+    surface = rng.normal(size=(7, 10, 3))
+    sheet = Sheet(
+        surface[::3, ::3],
+        stiffness=rng.uniform(1, 2, (2, 3)),
+        cut=np.eye(2, 3, dtype=bool),
+        surface=surface,
+        crease_width=0.7,
+    )
     return Scan(images, depth, calibration.camera, sheet, rng.uniform(0, 9, (4, 2)), filled_fraction=0.25)
 
 
@@ -70,6 +77,8 @@ def test_a_scan_survives_exactly(tmp_path: Path, scan: Scan) -> None:
     assert found.sheet.vertices.tobytes() == scan.sheet.vertices.tobytes()
     assert found.sheet.cut is not None
     assert np.array_equal(found.sheet.cut, np.eye(2, 3, dtype=bool))
+    assert np.array_equal(found.sheet.surface, scan.sheet.surface)
+    assert (found.sheet.refinement, found.sheet.crease_width) == (3, 0.7)
     assert found.filled_fraction == scan.filled_fraction == 0.25
     assert found.sheet.stiffness is not None
     assert found.sheet.stiffness.tobytes() == scan.sheet.stiffness.tobytes()  # type: ignore[union-attr]

@@ -57,6 +57,20 @@ def test_identity_flattening_returns_the_undistorted_view() -> None:
     assert restored.backward_map.dtype == np.float32
 
 
+def test_what_lies_inside_the_quads_is_textured_where_the_surface_went() -> None:
+    fine = flat_sheet(17, 23)
+    coarse = Sheet(fine.vertices[::2, ::2], surface=fine.vertices)
+    # Between the grid's own vertices, which stay, the surface has been 3 mm further to the right.
+    moved = fine.vertices.copy()
+    moved[1::2, 1::2, 0] -= 3.0
+    flattened = Flattened(coarse.vertices, Status.AT_REST, surface=moved)
+    by_surface = texture_quads(raw_image(), CAMERA, coarse, flattened)
+    by_fine_grid = texture_quads(raw_image(), CAMERA, fine, Flattened(moved, Status.AT_REST))
+    by_grid = texture_quads(raw_image(), CAMERA, coarse, still(coarse))
+    assert np.array_equal(by_surface.backward_map, by_fine_grid.backward_map, equal_nan=True)
+    assert 1.0 < np.nanmax(np.abs(by_surface.backward_map - by_grid.backward_map)) < 3.0
+
+
 def test_control_and_restoration_look_through_the_same_lens() -> None:
     """Seen through the lens the scene comes back where the ideal camera has it, not .1 px beside."""
     control = undistorted_view(raw_image(), CAMERA)
