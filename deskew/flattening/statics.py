@@ -35,6 +35,9 @@ _EVEN = 4.0
 # Smooth changes are the slowest to settle, and cheap on a coarse level: share of a vertex spacing that counts as none.
 _COARSE_TOLERANCE, _COARSE_ITERATIONS = 1e-4, 200
 
+# Height of a quad over its length below which it has no area to speak of.
+_FLATTEST = 1e-4
+
 # Share of a sheet's area, as seen from above, that must show its back before its grid counts as mirrored.
 _UPSIDE_DOWN = 0.25
 
@@ -74,6 +77,7 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     if settings.through > 1:
         return _through(sheet, settings)
     springs = grid_springs(sheet, settings.springs)
+    _require_area(sheet.vertices)
     tolerance = settings.tolerance * float(max(np.ptp(sheet.vertices[..., axis]) for axis in range(3)))
     found, folded, n_starts = _unfolded(sheet, springs, tolerance, settings.max_iterations)
     counters = {
@@ -95,6 +99,14 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     return Flattened(flat, status, remedy, counters, inside)
 
 
+def _require_area(vertices: Floats) -> None:
+    """Refuse a grid whose vertices all lie on one line: springs would lay it there again, and call it flat."""
+    across, down = vertices[1:, 1:] - vertices[:-1, :-1], vertices[1:, :-1] - vertices[:-1, 1:]
+    areas = np.linalg.norm(np.cross(across, down), axis=-1)
+    longest = np.maximum((across**2).sum(axis=-1), (down**2).sum(axis=-1))
+    require(bool((areas > _FLATTEST * longest).any()), "vertices", "span an area", "quads without area only")
+
+
 def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
     """Flatten a dense grid through every n-th of its vertices."""
     n, shape = settings.through, sheet.vertices.shape
@@ -114,6 +126,8 @@ def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:
 
 def _unfolded(sheet: Sheet, springs: Springs, tolerance: float, most: int) -> tuple[Iterated, int, int]:
     """Search from finer and finer starts until nothing is folded; return the result, its folded quads, the searches."""
+    # Only ratios matter: the stiffest spring is 1, as are those of the uniform hierarchy.
+    springs = replace(springs, k_s=springs.k_s / springs.k_max)
     even = _is_even(springs)
     uniform = hierarchy(spring_constants(springs.grid, 1.0))
     pyramid = _pyramid(sheet, springs, len(uniform.levels))
