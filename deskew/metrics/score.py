@@ -18,8 +18,7 @@ def _turning(points: Floats, triangles: Triangles, way: float) -> Floats:
 
 
 def _require_plane(name: str, points: Floats) -> None:
-    """Refuse places that no fit and no area could be computed of."""
-    require_places(name, points)
+    """Refuse places onto which nothing can be fitted."""
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     wide = len(spread) == 2 and spread[0] > SHORTEST_MM and spread[1] > 1e-9 * spread[0]
     require(bool(wide), name, f"span a plane, and more than {SHORTEST_MM:g} mm", "points on one line or in one place")
@@ -64,7 +63,8 @@ def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bo
     for name, points in (("truth", truth), ("flat", flat)):
         wanted = (len(sheet.vertices), 2)
         require(points.shape == wanted, name, f"have shape {wanted}", points.shape)
-        _require_plane(name, points)
+        require_places(name, points)
+        _require_plane(name, points[np.unique(faces)])
     way = upward(sheet)
     right = _turning(truth, faces, way)
     if same_axes and right is not truth:
