@@ -11,7 +11,7 @@ import deskew
 from deskew.errors import InputError
 from deskew.io import grid_faces
 from deskew.types import Array, Sheet, Status
-from tests.flattening.bent_sheets import cylinder, flat_grid
+from tests.flattening.bent_sheets import cylinder, flat_grid, rigid_error
 
 GRID = cylinder(30.0, (12, 16))[0]
 
@@ -66,6 +66,18 @@ def test_is_laid_flat_without_stretch_and_left_as_it_was(name: str, as_mesh: boo
         lengths, wanted = (np.linalg.norm(np.diff(points, axis=axis), axis=-1) for points in (places, bent))
         assert np.abs(lengths - wanted).max() < 3e-3 * wanted.mean()
     assert np.array_equal(given, before)
+
+
+@pytest.mark.parametrize("angle_deg", [60.0, 80.0, 88.0, 89.9, 90.0, 91.0, 120.0, 180.0])
+@pytest.mark.parametrize("noise_mm", [0.0, "auto"])
+def test_bent_page_turned_until_it_is_seen_edge_on_keeps_its_size(angle_deg: float, noise_mm: float | str) -> None:
+    """Turned about X, a bend about Y is seen from the side."""
+    bent, flat = cylinder(30.0, (25, 41))
+    c, s = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    turned = bent @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+    found = deskew.flatten(*as_triangles(turned), noise_mm=noise_mm).vertices.reshape(bent.shape)[..., :2]
+    seen = flat * [1.0, -1.0] if angle_deg > 105 else flat  # overturned, it is seen from behind
+    assert rigid_error(found, seen).max() < 0.03
 
 
 REFUSED: dict[str, tuple[Callable[[], Sheet], str]] = {
