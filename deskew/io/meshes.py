@@ -90,6 +90,10 @@ def sheet_mesh(sheet: Sheet, texture: Floats | None = None) -> Mesh:
 def _ply(data: bytes) -> Mesh:
     import trimesh  # here, since it takes longer to import than most commands that need no mesh take to run
 
+    require(data.startswith(b"ply"), "mesh", "begin with the word ply", shown(data[:8]))
+    header = data.partition(b"end_header")[0]
+    properties = set(re.findall(rb"^property\s+\w+\s+(\w+)\s*$", header, re.MULTILINE))
+    require(properties >= {b"x", b"y", b"z"}, "vertices", "have the properties x, y and z", "others")
     # fix_texture would split vertices at seams; no resolver is given, so that no file named inside is opened.
     loaded: Any = trimesh.load(
         io.BytesIO(data), file_type="ply", process=False, fix_texture=False, skip_materials=True, force="mesh"
@@ -97,7 +101,7 @@ def _ply(data: bytes) -> Mesh:
     uv = getattr(loaded.visual, "uv", None)
     texture = None if uv is None else np.array(uv, dtype=np.float64)
     vertices, faces = np.array(loaded.vertices), np.array(loaded.faces, dtype=np.int64).reshape(-1, 3)
-    n_vertices, n_faces = (_promised(data, kind) for kind in ("vertex", "face"))
+    n_vertices, n_faces = (_promised(header, kind) for kind in ("vertex", "face"))
     require(n_faces > 0, "mesh", "have faces", "none")
     # trimesh takes what it finds of a file that was cut short.
     require(len(vertices) == n_vertices, "vertices", f"be {n_vertices}, as the header says", len(vertices))
@@ -105,9 +109,8 @@ def _ply(data: bytes) -> Mesh:
     return Mesh(vertices, faces, texture)
 
 
-def _promised(data: bytes, kind: str) -> int:
+def _promised(header: bytes, kind: str) -> int:
     """Read from a PLY's header how many elements of a kind there are."""
-    header = data.partition(b"end_header")[0]
     found = re.search(rf"^element\s+{kind}\s+(\d+)\s*$".encode(), header, re.MULTILINE)
     return int(found[1]) if found else 0
 
