@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 
@@ -38,6 +39,8 @@ def mirror(
     """Draw a sheet of sharp mirror folds, :func:`data_synth.folds.crumpled`, on a grid of `shape`."""
     return crumpled(rng, page_size_mm, slope_p90_deg, shape=shape)
 
+
+MAX_SEED = 2**63 - 1
 
 KINDS: dict[str, tuple[Kind, tuple[float, float]]] = {
     "cylinder": (cylinder, (25.0, 45.0)),
@@ -126,7 +129,7 @@ def generate(
         If no drawn surface was fit.
     """
     require(kind in KINDS, "kind", f"be one of {', '.join(KINDS)}", kind)
-    require_whole("seed", seed, 0, 2**63 - 1)
+    require_whole("seed", seed, 0, MAX_SEED)
     rng = np.random.default_rng([seed, *kind.encode()])  # kinds of one seed have nothing in common
     draw, (gentle, steep) = KINDS[kind]
     # Both are drawn even when given, so that a seed's surface is the same shape of bends at any grid and severity.
@@ -157,9 +160,16 @@ def write_surface(sheet: TrueSheet, path: Path, comments: Sequence[str] = ()) ->
     write_bytes(text.getvalue(), path)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that would print its usage and exit, made to complain in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"The arguments must be as --help shows, got: {message}.")
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
-    parser = argparse.ArgumentParser(prog="python -m data_synth.surfaces", description=(__doc__ or "").split("\n")[0])
+    parser = _Parser(prog="python -m data_synth.surfaces", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path, help="made if it does not exist")
     parser.add_argument("--kind", default=",".join(KINDS), help="one or more, comma between [%(default)s]")
     parser.add_argument("--count", type=int, default=1, help="surfaces of each kind [%(default)s]")
@@ -167,9 +177,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--rows", type=int, help="vertices along the page's height [drawn, 180 to 240]")
     parser.add_argument("--columns", type=int, help="vertices along the page's width [square cells]")
     parser.add_argument("--slope-p90-deg", type=float, help="how bent [drawn]")
-    options = parser.parse_args(arguments)
     try:
-        _write_all(options)
+        _write_all(parser.parse_args(arguments))
     except DeskewError as error:
         print(f"error: {error}", file=sys.stderr)
         return error.exit_code
@@ -181,6 +190,7 @@ def _write_all(options: argparse.Namespace) -> None:
     for kind in kinds:
         require(kind in KINDS, "kind", f"be one of {', '.join(KINDS)}", kind)
     require_whole("count", options.count, 1, 10_000)
+    require_whole("seed", options.seed, 0, MAX_SEED - options.count + 1)
     both = (options.rows is None) == (options.columns is None)
     require(both, "rows", "be given together with `columns`", "one of them")
     shape = None if options.rows is None else (options.rows, options.columns)

@@ -62,6 +62,6 @@ def flatten(
     sheet = Sheet(vertices, faces)
     if stiffness is not None:
         sheet = flattening.with_stiffness(sheet, stiffness)
-    if noise_mm != 0.0:
+    if not (isinstance(noise_mm, int | float) and noise_mm == 0):  # methods without noise need not be told of none
         settings = {**settings, "noise_mm": noise_mm}
     return flattening.flatten(sheet, method=method, **settings)

@@ -14,6 +14,8 @@ from deskew.types import Array, Floats
 
 # Share of the area that an axis may see from behind: a vertical cell or two make no overhang.
 _SEEN_FROM_BEHIND = 1e-3
+# Share of its area that a sheet must show along an axis: seen nearly edge-on every bend is a wall.
+_SEEN_AT_ALL = 0.25
 # Noise turns the normals of a dense scan by 20 degrees and more; this many averagings over neighbours still it.
 _AVERAGINGS = 20
 
@@ -32,15 +34,15 @@ def noise_directions(vertices: Floats, faces: Array) -> Floats:
     -------
     (V, 3) array
         Unit vectors: +Z everywhere for a height field over the XY plane, one common vector for a height field over
-        another plane, smoothed normals for any other mesh.
+        another plane, smoothed normals for any other mesh. A height field that stands nearly on edge is none.
     """
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
-    mean = normals.sum(axis=0)
+    mean, whole = normals.sum(axis=0), float(np.linalg.norm(normals, axis=1).sum())
     for axis in (np.array([0.0, 0.0, 1.0]), mean / max(float(np.linalg.norm(mean)), 1e-300)):
         seen = np.einsum("fk,k->f", normals, axis)
         front, back = float(seen[seen > 0].sum()), -float(seen[seen < 0].sum())
-        if min(front, back) <= _SEEN_FROM_BEHIND * max(front, back) and max(front, back) > 0:
+        if min(front, back) <= _SEEN_FROM_BEHIND * max(front, back) and max(front, back) > _SEEN_AT_ALL * whole:
             return np.broadcast_to(axis, vertices.shape)
     return _smoothed_normals(normals, faces, len(vertices))
 

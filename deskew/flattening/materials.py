@@ -42,5 +42,5 @@ def with_stiffness(sheet: Sheet, stiffness: Floats | Callable[[Floats], Floats])
         return replace(sheet, stiffness=constants.reshape(places.shape[:-1]))
     except InputError:
         raise
-    except Exception as error:  # whatever a function from outside does
+    except (Exception, SystemExit) as error:  # whatever a function from outside does
         raise InputError(f"`stiffness` must return one number a middle, got {in_one_line(error)}.") from error

@@ -27,7 +27,7 @@ from deskew.flattening.energies import ENERGIES, BuildEnergy, Energy
 from deskew.flattening.intrinsic import Triangles, bearings, triangles
 from deskew.flattening.laplace import Laplacian
 from deskew.flattening.placement import as_seen, is_upside_down
-from deskew.flattening.settings import MAX_STEPS
+from deskew.flattening.settings import MAX_ITERATIONS
 from deskew.flattening.topology import Disc, disc_of
 from deskew.flattening.unfolding import unfold
 from deskew.types import Flattened, Floats, Sheet, Status
@@ -87,7 +87,7 @@ def flatten_mesh(
     """
     require(energy in ENERGIES, "energy", f"be one of {', '.join(ENERGIES)}", repr(energy))
     require_positive("tolerance", tolerance, 0.01)
-    require_whole("max_iterations", max_iterations, 1, MAX_STEPS)
+    require_whole("max_iterations", max_iterations, 1, MAX_ITERATIONS)
     disc = disc_of(sheet)
     if callable(rest):
         lengths = rest(disc.vertices, disc.faces)
@@ -189,9 +189,10 @@ def _stiffened(
             break
         flips = int(plate.turned_over(x).sum())
         found = _Found(x, found.iterations + n, flips, model.value(x), int(touched.sum()), converged)
-        if flips < best.flips:
+        better = flips < best.flips
+        if better:
             best = found
-        if not flips:
+        if not flips or not (better or converged):  # what neither rests nor turns any back is no sheet
             break
     return best._replace(iterations=found.iterations)
 

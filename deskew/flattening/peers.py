@@ -1,7 +1,8 @@
 """Flattenings by libigl, as peers to compare with: LSCM, as rigid as possible, SLIM.
 
-They take what the project's own methods take. Each is a start and an iteration, apart, so that a benchmark can time the
-iteration alone. libigl answers bad meshes with NaN and no error; here that is a status.
+They take what the project's own methods take, healed and refused alike (:mod:`.topology`): libigl itself answers bad
+meshes with NaN, or ends the process. What NaN is left is a status. Each is a start and an iteration, apart, so that a
+benchmark can time the iteration alone.
 
 References
 ----------
@@ -11,21 +12,23 @@ Rabinovich et al., Scalable locally injective mappings, ACM TOG 36(2), 2017 (SLI
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from deskew.errors import InputError, require
+from deskew.errors import InputError, StepError, in_one_line, require
 from deskew.flattening.conformal import signed_areas
 from deskew.flattening.edges import Indices, edges_of
 from deskew.flattening.meshes import faces_from_above
 from deskew.flattening.placement import as_seen
+from deskew.flattening.topology import disc_of
 from deskew.types import Flattened, Floats, Sheet, Status
 
 ARAP_ITERATIONS = 20
 SLIM_ITERATIONS = 15
-_UNUSABLE = "libigl found no finite places; heal coincident vertices and zero-area faces first, or use method `spring`"
+_UNUSABLE = "libigl found no finite places; remove zero-area faces first, or use method `spring`"
 _FOLDED = "{} faces are turned over; use method `spring`"
 
 
@@ -40,22 +43,21 @@ def lscm(sheet: Sheet) -> Flattened:
     Raises
     ------
     InputError
-        If libigl is not installed.
+        If libigl is not installed, or the mesh cannot lie flat in one piece (see `topology.disc_of`).
+    StepError
+        If libigl fails.
     """
-    vertices, faces = as_mesh(sheet)
-    return _answer(sheet, lscm_places(vertices, faces), faces, 1)
+    return _flattened(sheet, lscm_places, 1)
 
 
 def arap(sheet: Sheet) -> Flattened:
     """Flatten by libigl's ARAP, 20 iterations from its LSCM, one vertex pinned; parameters as for `lscm`."""
-    vertices, faces = as_mesh(sheet)
-    return _answer(sheet, arap_places(vertices, faces, lscm_places(vertices, faces)), faces, ARAP_ITERATIONS)
+    return _flattened(sheet, lambda v, f: arap_places(v, f, lscm_places(v, f)), ARAP_ITERATIONS)
 
 
 def slim(sheet: Sheet) -> Flattened:
     """Flatten by libigl's SLIM (symmetric Dirichlet), 15 iterations from its LSCM; parameters as for `lscm`."""
-    vertices, faces = as_mesh(sheet)
-    return _answer(sheet, slim_places(vertices, faces, lscm_places(vertices, faces)), faces, SLIM_ITERATIONS)
+    return _flattened(sheet, lambda v, f: slim_places(v, f, lscm_places(v, f)), SLIM_ITERATIONS)
 
 
 PEERS = {"lscm": lscm, "arap": arap, "slim": slim}
@@ -120,15 +122,25 @@ def slim_places(vertices: Floats, faces: Indices, start: Floats, iterations: int
     return np.asarray(igl.slim_solve(data, iterations))[:, :2]
 
 
-def _answer(sheet: Sheet, places: Floats, faces: Indices, iterations: int) -> Flattened:
-    """Lay libigl's places onto Z = 0 over the sheet, or say that they are of no use."""
-    counters = {"iterations": float(iterations)}
-    if not np.isfinite(places).all():
-        return Flattened(np.full(sheet.vertices.shape, np.nan), Status.DIVERGED, _UNUSABLE, counters)
-    flips = int((signed_areas(places, faces) <= 0).sum())
-    out = as_seen(places, sheet.vertices.reshape(-1, 3)).reshape(sheet.vertices.shape)
-    status, remedy = (Status.FOLDED, _FOLDED.format(flips)) if flips else (Status.AT_REST, "")
-    return Flattened(out, status, remedy, counters | {"flips": float(flips)})
+def _flattened(sheet: Sheet, places_of: Callable[[Floats, Indices], Floats], iterations: int) -> Flattened:
+    """Heal a sheet, have libigl place its vertices, and lay them onto Z = 0 over the sheet if they are of any use."""
+    _igl()
+    disc = disc_of(Sheet(*as_mesh(sheet)))
+    vertices, faces = disc.vertices, faces_from_above(disc.vertices, disc.faces)
+    try:
+        places = places_of(vertices, faces)
+    except RuntimeError as error:
+        raise StepError(f"Flattening by libigl failed: {in_one_line(error)}; use method `spring`.") from error
+    counters = {"iterations": float(iterations), **disc.counts}
+    out = np.full((len(places), 3), np.nan)
+    if np.isfinite(places).all():
+        flips = int((signed_areas(places, faces) <= 0).sum())
+        counters["flips"] = float(flips)
+        out = as_seen(places, vertices)
+        status, remedy = (Status.FOLDED, _FOLDED.format(flips)) if flips else (Status.AT_REST, "")
+    else:
+        status, remedy = Status.DIVERGED, _UNUSABLE
+    return Flattened(out[disc.representative].reshape(sheet.vertices.shape), status, remedy, counters)
 
 
 def _mean_edge(places: Floats, faces: Indices) -> float:

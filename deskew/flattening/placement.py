@@ -10,6 +10,8 @@ from deskew.types import Floats
 # Share of a sheet's area, as seen from above, that must show its back before it counts as upside down: a sheet rolled
 # by more than half a turn shows up to 0.22, an overturned page nearly all.
 _UPSIDE_DOWN = 0.25
+# Area of a quad over its longer diagonal's square below which it has none to speak of.
+_NO_AREA = 1e-4
 
 
 def is_upside_down(normals: Floats) -> bool:
@@ -28,6 +30,11 @@ def handedness(vertices: Floats) -> float:
     """
     seen, whole = _areas(np.ascontiguousarray(vertices, dtype=np.float64))
     return 1.0 if seen > _UPSIDE_DOWN * whole else -1.0
+
+
+def has_area(vertices: Floats) -> bool:
+    """Whether any quad of a grid, (R, C, 3) [mm], is more than a line."""
+    return bool(_broadest(np.ascontiguousarray(vertices, dtype=np.float64)) > _NO_AREA)
 
 
 def as_seen(places: Floats, vertices: Floats, mirror: float = 1.0) -> Floats:
@@ -69,6 +76,23 @@ def _areas(v):  # type: ignore[no-untyped-def]
             seen += z
             whole += np.sqrt(x * x + y * y + z * z)
     return seen, whole
+
+
+@njit(cache=True)
+def _broadest(v):  # type: ignore[no-untyped-def]
+    """Return twice the area over the longer diagonal's square of a grid's first quad that has area, or of its best."""
+    best = 0.0
+    for r in range(v.shape[0] - 1):
+        for c in range(v.shape[1] - 1):
+            aa, bb, ab = 0.0, 0.0, 0.0
+            for k in range(3):
+                a, b = v[r + 1, c + 1, k] - v[r, c, k], v[r + 1, c, k] - v[r, c + 1, k]
+                aa, bb, ab = aa + a * a, bb + b * b, ab + a * b
+            if max(aa, bb) > 0.0:
+                best = max(best, np.sqrt(max(aa * bb - ab * ab, 0.0)) / max(aa, bb))
+        if best > _NO_AREA:
+            break
+    return best
 
 
 @njit(cache=True)

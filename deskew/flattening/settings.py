@@ -8,10 +8,11 @@ from typing import TypeVar, cast
 
 from deskew.errors import require, require_whole
 from deskew.flattening.contact import READINGS
+from deskew.types.pages import STIFFNESS_RANGE
 
 # Beyond these the arithmetic overflows or the step vanishes, long before anything is physical.
-SMALLEST, LARGEST = 1e-9, 1e12
-MAX_STEPS = 1_000_000_000
+SMALLEST, LARGEST = STIFFNESS_RANGE
+MAX_STEPS, MAX_ITERATIONS = 1_000_000_000, 1_000_000
 RESTS = ("chord", "section")
 ENERGIES = ("springs", "arap")
 AUTO = "auto"
@@ -41,7 +42,8 @@ class SpringSettings:
 
     def __post_init__(self) -> None:
         require_constant("k_s", self.k_s, "kg/s^2")
-        require(self.rest in RESTS, "rest", f"be one of {', '.join(RESTS)}", repr(self.rest))
+        named = isinstance(self.rest, str) and self.rest in RESTS
+        require(named, "rest", f"be one of {', '.join(RESTS)}", repr(self.rest))
         for name in ("bending", "more"):
             value = getattr(self, name)
             require(_is_number(value) and 0 <= value <= 1000, name, "be a number in [0, 1000]", repr(value))
@@ -66,7 +68,7 @@ class StaticSettings:
     tolerance : float
         Change of a coordinate in one iteration that counts as none, in units of the sheet's size, in [1e-12, 1e-2].
     max_iterations : int
-        In [1, 1e9].
+        In [1, 1e6].
     through : int
         Flatten every n-th vertex of a grid alone, with the others as its `surface`, and lay those down between them; in
         [1, 1000].
@@ -84,13 +86,14 @@ class StaticSettings:
 
     def __post_init__(self) -> None:
         _ = self.springs
-        named = self.energy is None or self.energy in ENERGIES
+        named = self.energy is None or (isinstance(self.energy, str) and self.energy in ENERGIES)
         require(named, "energy", f"be one of {', '.join(ENERGIES)}, or None", repr(self.energy))
-        noise = self.noise_mm == AUTO or (_is_number(self.noise_mm) and 0 <= float(self.noise_mm) <= 1000)
+        auto = isinstance(self.noise_mm, str) and self.noise_mm == AUTO
+        noise = auto or (_is_number(self.noise_mm) and 0 <= float(self.noise_mm) <= 1000)
         require(noise, "noise_mm", 'be "auto" or in [0, 1000] mm', repr(self.noise_mm))
         fine = _is_number(self.tolerance) and 1e-12 <= self.tolerance <= 1e-2
         require(fine, "tolerance", "be a number in [1e-12, 0.01]", repr(self.tolerance))
-        require_whole("max_iterations", self.max_iterations, 1, MAX_STEPS)
+        require_whole("max_iterations", self.max_iterations, 1, MAX_ITERATIONS)
         require_whole("through", self.through, 1, 1000)
 
     @property

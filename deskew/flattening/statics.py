@@ -24,7 +24,7 @@ from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.inside import flat_surface
 from deskew.flattening.laplace import laplacian
 from deskew.flattening.multigrid import Hierarchy, framed, hierarchy, moved, unframed, v_cycle
-from deskew.flattening.placement import as_seen, handedness
+from deskew.flattening.placement import as_seen, handedness, has_area
 from deskew.flattening.pyramid import Grid, pyramid, refined
 from deskew.flattening.settings import StaticSettings
 from deskew.flattening.springs import Springs, chord_lengths, grid_springs, spring_constants
@@ -64,6 +64,8 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     if settings.through > 1:
         return _through(sheet, settings)
     springs = grid_springs(sheet, settings.springs)
+    # Springs would lay vertices on one line there again, and call it flat.
+    require(has_area(sheet.vertices), "vertices", "span an area", "quads without area only")
     tolerance = settings.tolerance * float(max(np.ptp(sheet.vertices[..., axis]) for axis in range(3)))
     found, folded, n_starts = _unfolded(sheet, springs, tolerance, settings.max_iterations)
     counters = {

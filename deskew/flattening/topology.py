@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from deskew.errors import require
 from deskew.flattening.edges import Edges, Indices, border_loops, edges_of
 from deskew.types import Array, Floats, Sheet
+from deskew.types.arrays import SHORTEST_MM
 
 _COINCIDENT = 1e-9  # vertices closer than this share of the mesh's size lie in one place
 
@@ -65,8 +66,11 @@ def disc_of(sheet: Sheet) -> Disc:
     """
     require(sheet.faces is not None, "faces", "be given for a triangle mesh", None)
     given = np.ascontiguousarray(sheet.faces, dtype=np.int64)
-    size = float(np.ptp(sheet.vertices, axis=0).max())
-    require(size > 0, "vertices", "not all lie in one place", f"{len(sheet.vertices)} coincident vertices")
+    # What no face uses may lie anywhere, and says nothing of how large the mesh is.
+    used = np.zeros(len(sheet.vertices), dtype=np.bool_)
+    used[given] = True
+    size = float(np.ptp(sheet.vertices[used], axis=0).max())
+    require(size > SHORTEST_MM, "vertices", f"not all lie in one place, within {SHORTEST_MM:g} mm", f"{size:g} mm")
     merged = np.arange(len(sheet.vertices))
     disc, complaint = _tidy(sheet.vertices, given, merged, size)
     places = _places(sheet.vertices, size)

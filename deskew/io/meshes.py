@@ -6,6 +6,7 @@ PLY goes through trimesh; OBJ does not, since trimesh would order its vertices a
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from deskew.io import obj
 from deskew.io.files import read_bytes, shown, write_bytes
 from deskew.io.obj import Faces
 from deskew.types import Floats, Sheet
+from deskew.types.arrays import require_places
 
 MESH_SUFFIXES = (".obj", ".ply")
 
@@ -45,7 +47,7 @@ class Mesh:
         if self.texture is not None:
             wanted = (len(self.vertices), 2)
             require(self.texture.shape == wanted, "texture", f"have shape {wanted}", self.texture.shape)
-            require(bool(np.isfinite(self.texture).all()), "texture", "be finite", "NaN or infinity")
+            require_places("texture", self.texture)
 
     @property
     def sheet(self) -> Sheet:
@@ -88,13 +90,29 @@ def sheet_mesh(sheet: Sheet, texture: Floats | None = None) -> Mesh:
 def _ply(data: bytes) -> Mesh:
     import trimesh  # here, since it takes longer to import than most commands that need no mesh take to run
 
+    require(data.startswith(b"ply"), "mesh", "begin with the word ply", shown(data[:8]))
+    header = data.partition(b"end_header")[0]
+    properties = set(re.findall(rb"^property\s+\w+\s+(\w+)\s*$", header, re.MULTILINE))
+    require(properties >= {b"x", b"y", b"z"}, "vertices", "have the properties x, y and z", "others")
     # fix_texture would split vertices at seams; no resolver is given, so that no file named inside is opened.
     loaded: Any = trimesh.load(
         io.BytesIO(data), file_type="ply", process=False, fix_texture=False, skip_materials=True, force="mesh"
     )
     uv = getattr(loaded.visual, "uv", None)
     texture = None if uv is None else np.array(uv, dtype=np.float64)
-    return Mesh(np.array(loaded.vertices), np.array(loaded.faces, dtype=np.int64), texture)
+    vertices, faces = np.array(loaded.vertices), np.array(loaded.faces, dtype=np.int64).reshape(-1, 3)
+    n_vertices, n_faces = (_promised(header, kind) for kind in ("vertex", "face"))
+    require(n_faces > 0, "mesh", "have faces", "none")
+    # trimesh takes what it finds of a file that was cut short.
+    require(len(vertices) == n_vertices, "vertices", f"be {n_vertices}, as the header says", len(vertices))
+    require(len(faces) >= n_faces, "faces", f"be {n_faces} or more, as the header says", len(faces))
+    return Mesh(vertices, faces, texture)
+
+
+def _promised(header: bytes, kind: str) -> int:
+    """Read from a PLY's header how many elements of a kind there are."""
+    found = re.search(rf"^element\s+{kind}\s+(\d+)\s*$".encode(), header, re.MULTILINE)
+    return int(found[1]) if found else 0
 
 
 def read_mesh(path: Path) -> Mesh:
@@ -120,7 +138,7 @@ def read_mesh(path: Path) -> Mesh:
     require(suffix in MESH_SUFFIXES, str(path), f"end in {' or '.join(MESH_SUFFIXES)}", suffix or "no suffix")
     data = read_bytes(path)
     try:
-        return Mesh(*obj.parsed(data.decode("utf-8"))) if suffix == ".obj" else _ply(data)
+        return Mesh(*obj.parsed(data.decode("utf-8-sig"))) if suffix == ".obj" else _ply(data)
     except InputError as error:
         raise InputError(f"`{path}`: {error}") from error
     except Exception as error:  # a damaged file surfaces in trimesh as any of a dozen types, none of them its own

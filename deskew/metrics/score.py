@@ -9,11 +9,19 @@ from deskew.metrics.strain import flat_error
 from deskew.metrics.stretch import stretch_figures
 from deskew.metrics.triangles import Triangles, signed_areas, upward
 from deskew.types import Floats, Sheet
+from deskew.types.arrays import SHORTEST_MM, require_places
 
 
 def _turning(points: Floats, triangles: Triangles, way: float) -> Floats:
     """Reverse the second axis if that is what makes the triangles turn the given way on the whole."""
     return points * [1.0, -1.0] if signed_areas(points, triangles).sum() * way < 0 else points
+
+
+def _require_plane(name: str, points: Floats) -> None:
+    """Refuse places onto which nothing can be fitted."""
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    wide = len(spread) == 2 and spread[0] > SHORTEST_MM and spread[1] > 1e-9 * spread[0]
+    require(bool(wide), name, f"span a plane, and more than {SHORTEST_MM:g} mm", "points on one line or in one place")
 
 
 def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bool = False) -> dict[str, float]:
@@ -46,7 +54,7 @@ def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bo
     Raises
     ------
     InputError
-        If the sheet is a grid, or the three do not have the same vertices, all finite.
+        If the sheet is a grid, or the three do not have the same vertices, all finite and not on one line.
     StepError
         If the flattening is mirrored.
     """
@@ -55,7 +63,8 @@ def score_flattening(sheet: Sheet, truth: Floats, flat: Floats, *, same_axes: bo
     for name, points in (("truth", truth), ("flat", flat)):
         wanted = (len(sheet.vertices), 2)
         require(points.shape == wanted, name, f"have shape {wanted}", points.shape)
-        require(bool(np.isfinite(points).all()), name, "be finite", "NaN or infinity")
+        require_places(name, points)
+        _require_plane(name, points[np.unique(faces)])
     way = upward(sheet)
     right = _turning(truth, faces, way)
     if same_axes and right is not truth:

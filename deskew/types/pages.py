@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from numbers import Real
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from deskew.errors import require
-from deskew.types.arrays import Array, Floats, require_numbers
+from deskew.types.arrays import Array, Floats, require_numbers, require_places
 from deskew.types.depth import DepthMap, ProjectorCheck
 from deskew.types.devices import Pinhole
+
+STIFFNESS_RANGE = 1e-9, 1e12
+"""Smallest and largest spring constant [kg/s^2]: beyond them arithmetic overflows, long after anything is physical."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +62,18 @@ class Sheet:
             require(vertices.ndim == 2 and vertices.shape[1] == 3, "vertices", "have shape (V, 3)", vertices.shape)
             require(self.faces.ndim == 2 and self.faces.shape[1] == 3, "faces", "have shape (F, 3)", self.faces.shape)
             n = len(vertices)
-            inside = self.faces.size > 0 and int(self.faces.min()) >= 0 and int(self.faces.max()) < n
-            require(inside, "faces", f"be non-empty with indices in [0, {n - 1}]", f"{len(self.faces)} faces")
-        require(
-            bool(np.isfinite(vertices).all()),
-            "vertices",
-            "be finite",
-            f"{int((~np.isfinite(vertices)).any(-1).sum())} vertices with NaN or infinity",
-        )
+            require(n > 0, "vertices", "be 1 or more", n)
+            require(len(self.faces) > 0, "faces", "be 1 or more", 0)
+            low, high = int(self.faces.min()), int(self.faces.max())
+            require(low >= 0 and high < n, "faces", f"have indices in [0, {n - 1}]", low if low < 0 else high)
+        require_places("vertices", vertices)
         self._check_stiffness()
         if self.cut is not None:
             shape = (vertices.shape[0] - 1, vertices.shape[1] - 1)
-            sound = self.faces is None and self.cut.shape == shape and self.cut.dtype == np.bool_
-            require(sound, "cut", f"be bool of shape {shape}, one value a quad of a grid", self.cut.shape)
+            array = isinstance(self.cut, np.ndarray)
+            got = f"{self.cut.dtype} of shape {self.cut.shape}" if array else type(self.cut).__name__
+            sound = array and self.faces is None and self.cut.shape == shape and self.cut.dtype == np.bool_
+            require(sound, "cut", f"be bool of shape {shape}, one value a quad of a grid", got)
             require(not self.cut.all(), "cut", "leave a quad whole", "every quad cut")
         self._check_surface()
 
@@ -89,11 +92,15 @@ class Sheet:
         require(
             self.stiffness.shape == shape, "stiffness", f"have shape {shape}, one value a {each}", self.stiffness.shape
         )
-        sound = bool((self.stiffness > 0).all() and np.isfinite(self.stiffness).all())
-        require(sound, "stiffness", "be positive and finite [kg/s^2]", f"a minimum of {np.min(self.stiffness)}")
+        least, most = STIFFNESS_RANGE
+        low, high = float(self.stiffness.min()), float(self.stiffness.max())  # both NaN if any is
+        sound = least <= low and high <= most
+        require(sound, "stiffness", f"be in [{least:g}, {most:g}] [kg/s^2]", f"{low:g} to {high:g}")
 
     def _check_surface(self) -> None:
-        require(0 <= self.crease_width <= 10, "crease_width", "be in [0, 10] steps of the surface", self.crease_width)
+        width = self.crease_width
+        real = isinstance(width, Real) and not isinstance(width, bool) and 0 <= width <= 10
+        require(real, "crease_width", "be in [0, 10] steps of the surface", repr(width))
         if self.surface is None:
             return
         require_numbers("surface", self.surface, "fiu")
@@ -103,7 +110,7 @@ class Sheet:
         n = self.refinement
         nested = n >= 2 and self.surface.shape == ((rows - 1) * n + 1, (columns - 1) * n + 1, 3)
         require(nested, "surface", f"have shape ({rows - 1} n + 1, {columns - 1} n + 1, 3), n >= 2", self.surface.shape)
-        require(bool(np.isfinite(self.surface).all()), "surface", "be finite", "NaN or infinity")
+        require_places("surface", self.surface)
         same = np.abs(self.surface[::n, ::n] - self.vertices).max() <= 1e-6 * max(
             1.0, float(np.abs(self.vertices).max())
         )

@@ -120,7 +120,7 @@ WRONG: dict[str, tuple[str, str]] = {
     "a face less": ("score less.obj -t truth.obj", "`less.obj` must have the truth's 240 faces, got 239"),
     "another face": ("score other.obj -t truth.obj", "must have the truth's faces, wound alike, got 1 others"),
     "wound otherwise": ("score wound.obj -t truth.obj", "must have the truth's faces, wound alike, got 240 others"),
-    "on a line": ("score line.obj -t truth.obj", "`source` must span a plane, got points on one line"),
+    "on a line": ("score line.obj -t truth.obj", "`flat` must span a plane, and more than 1e-09 mm, got points on"),
 }  # fmt: skip
 
 

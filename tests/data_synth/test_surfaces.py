@@ -166,6 +166,12 @@ def test_the_command_writes_the_same_bytes_again_and_says_how_bent(
         (["--rows", "1", "--columns", "9"], "`rows` must be a whole number in [2, 2000], got 1."),
         (["--count", "0"], "`count` must be a whole number in [1, 10000], got 0."),
         (["--seed", "-1"], "`seed` must be a whole number in [0, 9223372036854775807], got -1."),
+        (
+            ["--seed", str(2**63 - 1), "--count", "2"],
+            "`seed` must be a whole number in [0, 9223372036854775806], got 9223372036854775807.",
+        ),
+        (["--count", "x"], "The arguments must be as --help shows, got: argument --count: invalid int value: 'x'."),
+        (["--bent"], "The arguments must be as --help shows, got: unrecognized arguments: --bent."),
         (["--kind", "cone", "--slope-p90-deg", "nan"], "`slope_p90_deg` must be in [1, 50], got nan."),
     ],
 )

@@ -181,6 +181,22 @@ def test_sheets_beyond_all_measure_are_refused(scale: float, message: str) -> No
         ({"vertices": np.eye(3), "faces": np.eye(3)}, "`faces` must be an array of whole numbers, got float64"),
         ({"vertices": np.eye(3), "faces": np.eye(3) > 0}, "`faces` must be an array of whole numbers, got bool"),
         ({"vertices": np.eye(3), "faces": [[0, 1, 2]]}, "`faces` must be an array of whole numbers, got list"),
+        (
+            {"vertices": np.ma.masked_less(flat_grid(), -40.0)},
+            "`vertices` must be an array of real numbers, got masked values",
+        ),
+        ({"vertices": np.eye(3), "faces": np.array([[0, 1, -1]])}, r"`faces` must have indices in \[0, 2\], got -1"),
+        ({"vertices": np.eye(3), "faces": np.array([[0, 1, 3]])}, r"`faces` must have indices in \[0, 2\], got 3"),
+        ({"vertices": np.eye(3), "faces": np.zeros((0, 3), int)}, "`faces` must be 1 or more, got 0"),
+        ({"vertices": np.zeros((0, 3)), "faces": np.zeros((1, 3), int)}, "`vertices` must be 1 or more, got 0"),
+        ({"vertices": flat_grid(), "cut": [[False]]}, r"`cut` must be bool of shape \(8, 10\).*, got list"),
+        ({"vertices": flat_grid(), "cut": np.zeros((8, 10), int)}, "`cut` must be bool .*, got int64 of shape"),
+        ({"vertices": flat_grid(), "crease_width": "wide"}, r"`crease_width` must be in \[0, 10\].*, got 'wide'"),
+        ({"vertices": flat_grid(), "crease_width": np.nan}, r"`crease_width` must be in \[0, 10\].*, got nan"),
+        (
+            {"vertices": flat_grid(), "stiffness": np.full((8, 10), np.nan)},
+            r"`stiffness` must be in .*, got nan to nan",
+        ),
         ({"vertices": flat_grid(), "stiffness": [[1.0]]}, "`stiffness` must be an array of real numbers, got list"),
     ],
 )

@@ -311,10 +311,34 @@ def test_too_few_iterations_are_told() -> None:
     assert "raise `max_iterations`" in result.remedy
 
 
+def bowl(n: int = 13) -> Array:
+    """A surface that cannot lie flat, so that its springs are at rest in one place only."""
+    grid = flat_grid((n, n), (60.0, 60.0))
+    grid[..., 2] = ((grid[..., 0] - 30) ** 2 + (grid[..., 1] + 30) ** 2) / 60
+    return grid
+
+
+@pytest.mark.parametrize("constant", [1e-9, 0.01, 30.0, 1e11])
+@pytest.mark.parametrize("ratio", [1.0, 3.0, 8.0])
+def test_only_ratios_of_stiffness_matter(constant: float, ratio: float) -> None:
+    quads = np.where(np.arange(12) < 6, ratio, 1.0) * np.ones((12, 1))
+    one, other = (flatten(Sheet(bowl(), stiffness=k * quads)) for k in (1.0, constant))
+    assert one.status is other.status is Status.AT_REST
+    assert np.abs(one.vertices - other.vertices).max() < 1e-9
+    assert other.counters["spring_energy"] == pytest.approx(constant * one.counters["spring_energy"], rel=1e-9)
+    if ratio == 1.0:
+        assert np.abs(flatten(Sheet(bowl()), k_s=constant).vertices - one.vertices).max() < 1e-9
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         ("rest", "chords"),
+        ("rest", np.ones(2)),
+        ("energy", np.ones(2)),
+        ("noise_mm", np.ones(2)),
+        ("noise_mm", True),
+        ("max_iterations", 10**7),
         ("energy", "elastic"),
         ("noise_mm", -1.0),
         ("noise_mm", "much"),

@@ -46,6 +46,7 @@ REFUSED: dict[str, tuple[Callable[[], tuple[Array, Array]], str]] = {
     "moebius": (moebius, "must have two sides, got a surface with one side"),
     "handle": (handle, "lie flat as a disc with holes, got 1 handles"),
     "point": (lambda: (0 * V, F), "not all lie in one place"),
+    "speck": (lambda: (1e-12 * V, F), "not all lie in one place, within 1e-09 mm"),
     "line": (line, "must span an area"),
     "corners": (lambda: (V, np.array([[0, 0, 1]])), "corners given twice only"),
 }
@@ -90,6 +91,11 @@ def test_coincident_neighbours_are_healed_with_a_count() -> None:
     assert found.counters["healed_vertices"] == 2
     assert found.counters["healed_faces"] == 4 - 1  # the corner vertex has one face on that edge
     np.testing.assert_array_equal(found.vertices[40], found.vertices[41])
+
+
+def test_a_far_vertex_without_a_face_merges_no_others() -> None:
+    disc = disc_of(Sheet(np.concatenate([1e-2 * V, [[1e9, 0.0, 0.0]]]), F))
+    assert (len(disc.vertices), disc.counts["healed_vertices"]) == (len(V), 1)
 
 
 def test_unjoined_triangles_are_joined() -> None:

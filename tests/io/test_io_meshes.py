@@ -108,6 +108,21 @@ def test_negative_indices_and_polygons_are_read(tmp_path: Path) -> None:
     assert read_mesh(tmp_path / "a.obj").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+def test_a_byte_order_mark_costs_no_vertex(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_bytes(b"\xef\xbb\xbf" + (SQUARE + "f 1 2 3\n").encode())
+    assert len(read_mesh(tmp_path / "a.obj").vertices) == 4
+
+
+def test_what_else_a_ply_holds_is_passed_over(tmp_path: Path) -> None:
+    more = "property float quality\nproperty uchar red\n"
+    face = "element face 1\nproperty list uchar int vertex_indices\nproperty uchar flags\n"
+    edge = "element edge 1\nproperty int a\nproperty int b\nend_header\n"
+    data = "0 0 0 .5 1\n1 0 0 .5 1\n1 1 0 .5 1\n4 0 1 2 3 7\n0 1\n".replace("4 0", "0 1 0 .5 1\n4 0")
+    (tmp_path / "a.ply").write_text(PLY.replace("vertex 3", "vertex 4") + more + face + edge + data)
+    found = read_mesh(tmp_path / "a.ply")
+    assert (len(found.vertices), found.faces.tolist()) == (4, [[0, 1, 2], [2, 3, 0]])
+
+
 @pytest.mark.parametrize("shape", [(2, 2), (3, 5), (45, 45)])
 def test_a_grids_triangles_cover_it_once_facing_the_camera(shape: tuple[int, int]) -> None:
     n_rows, n_columns = shape
@@ -156,6 +171,14 @@ WRONG_PLY = {
     "index negative": PLY + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 -1\n",
     "NaN": PLY + FACE + "0 0 0\nnan 0 0\n0 1 0\n3 0 1 2\n",
     "no faces": PLY + "end_header\n0 0 0\n1 0 0\n0 1 0\n",
+    "fewer faces than promised": PLY + FACE.replace("face 1", "face 5") + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+    "fewer vertices than promised": PLY.replace("vertex 3", "vertex 9") + FACE + "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+    "colours only": PLY.replace("float x", "uchar red")
+    .replace("float y", "uchar green")
+    .replace("float z", "uchar blue")
+    + FACE
+    + "1 2 3\n1 2 3\n1 2 3\n3 0 1 2\n",
+    "beyond all measure": PLY + FACE + "0 0 0\n1e30 0 0\n0 1 0\n3 0 1 2\n",
     "a billion vertices": PLY.replace("vertex 3", "vertex 1000000000").replace("ascii", "binary_little_endian") + FACE,
 }
 

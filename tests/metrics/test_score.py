@@ -127,5 +127,12 @@ def test_wrong_inputs_are_refused() -> None:
         score_flattening(sheet, flat, flat[1:])
     with pytest.raises(InputError, match="`truth` must be finite"):
         score_flattening(sheet, flat * np.nan, flat)
+    with pytest.raises(InputError, match=r"`truth` must lie within 1e\+09 mm of the origin"):
+        score_flattening(sheet, flat * 1e200, flat)
+    for nothing in (flat * 0.0, flat * [1.0, 0.0], flat * 1e-200):
+        with pytest.raises(InputError, match="`truth` must span a plane"):
+            score_flattening(sheet, nothing, flat)
+        with pytest.raises(InputError, match="`flat` must span a plane"):
+            score_flattening(sheet, flat, nothing)
     with pytest.raises(InputError, match="`sheet` must be a triangle mesh, got a grid"):
         score_flattening(Sheet(sheet.vertices.reshape(7, 81, 3)), flat, flat)
