@@ -57,11 +57,14 @@ def flatten(
     """
     # Here, not above: `import deskew` costs nothing, and the commands say what is wrong with their arguments at once.
     from deskew import flattening
+    from deskew.errors import require
     from deskew.types import Sheet
 
     sheet = Sheet(vertices, faces)
     if stiffness is not None:
         sheet = flattening.with_stiffness(sheet, stiffness)
     if not (isinstance(noise_mm, int | float) and noise_mm == 0):  # methods without noise need not be told of none
+        known = method in flattening.METHODS and method != flattening.DEFAULT
+        require(not known, "noise_mm", f"be 0 for {method}: only {flattening.DEFAULT} removes noise", noise_mm)
         settings = {**settings, "noise_mm": noise_mm}
     return flattening.flatten(sheet, method=method, **settings)

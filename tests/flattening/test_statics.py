@@ -356,6 +356,12 @@ def test_setting_out_of_range_is_refused_by_name(name: str, value: object) -> No
         StaticSettings(**{name: value})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("method", ["paper_rk4", "arap"])
+def test_noise_is_refused_for_methods_that_cannot_remove_it(method: str) -> None:
+    with pytest.raises(InputError, match=f"`noise_mm` must be 0 for {method}: only spring removes noise, got auto"):
+        deskew.flatten(folded(0), method=method, noise_mm="auto")
+
+
 def test_failing_function_of_stiffness_is_one_clear_error() -> None:
     for function, message in ((lambda p: 1 / 0, "ZeroDivisionError"), (lambda p: p[:3, 0], "reshape")):
         with pytest.raises(InputError, match=rf"`stiffness` must return one number a middle, got .*{message}"):
