@@ -109,6 +109,25 @@ def test_a_mesh_of_noise_ends_folded_and_says_so() -> None:
     assert np.isfinite(flat.vertices).all()
 
 
+@pytest.mark.parametrize(
+    ("faces", "places"),
+    [
+        ([[0, 1, 2]], [[0, 0, 0], [9, 0, 0], [0, 9, 3]]),
+        ([[0, 1, 2], [2, 1, 3]], [[0, 0, 0], [9, 0, 0], [0, 9, 3], [9, 9, 0]]),
+        ([[0, 1, 2], [2, 1, 3]], [[0, 0, 0], [9, 0, 0], [9, 1e-7, 0], [9, 9, 0]]),
+    ],
+    ids=["one face", "two faces", "two faces and an edge of hardly any length"],
+)
+@pytest.mark.parametrize("noise_mm", [0.0, "auto", 0.3, 1000.0])
+def test_a_face_or_two_are_flat_whatever_noise_they_have(
+    faces: list[list[int]], places: list[list[float]], noise_mm: float | str
+) -> None:
+    vertices = np.array(places, dtype=float)
+    flat = deskew.flatten(vertices, np.array(faces), noise_mm=noise_mm)
+    assert flat.status is Status.AT_REST
+    assert np.isfinite(flat.vertices).all()
+
+
 @pytest.mark.parametrize("stiffness", [lambda p: 1 / 0, lambda p: p, lambda p: None, lambda p: "stiff", exit])
 def test_whatever_a_function_of_stiffness_does_is_one_line(stiffness: Callable[..., Array]) -> None:
     with pytest.raises(InputError, match="`stiffness` must return one number a middle, got ") as error:
