@@ -101,6 +101,16 @@ def test_what_is_no_surface_is_refused_by_name(name: str) -> None:
         deskew.flattening.flatten(make())
 
 
+@pytest.mark.parametrize("other", [(0, 2), (0, 9), (9, 9), (5, 0)])
+def test_a_grid_that_meets_itself_is_flattened_or_said_to_fold(other: tuple[int, int]) -> None:
+    """Vertices in one place that no spring joins; on a coarser grid one may."""
+    grid = cylinder(30.0, (10, 10))[0]
+    grid[0, 0] = grid[other]
+    flat = deskew.flatten(grid)
+    assert flat.status in (Status.AT_REST, Status.FOLDED)
+    assert np.isfinite(flat.vertices).all()
+
+
 def test_a_mesh_of_noise_ends_folded_and_says_so() -> None:
     rng = np.random.default_rng(2)
     flat = deskew.flatten(*as_triangles(rng.normal(size=(12, 12, 3))))
