@@ -68,7 +68,7 @@ def _triangles(rest: Floats, index: npt.NDArray[np.intp]) -> list[tuple[Floats, 
 
 def _add_triangles(band: Complex, corners: Floats, lengths: Floats) -> None:
     """Add |sum_j w_j x_j|^2 / (4 area) of triangles laid out by their sides, w_j the side opposite corner j."""
-    a, b, c = lengths.T
+    a, b, c = np.maximum(lengths, 1e-9 * lengths.max()).T  # on a coarse level two vertices may share a place
     x = (b * b + c * c - a * a) / (2 * c)
     height = np.sqrt(np.maximum(b * b - x * x, (1e-3 * b) ** 2))  # three lengths of a noisy sheet need not close
     places = np.stack([np.zeros_like(c), c, x + 1j * height])

@@ -63,7 +63,7 @@ def hinges_of(vertices: Floats, faces: Array, directions: Floats) -> Hinges:
     # Relative to one corner: coordinates far from the origin would cancel badly.
     arms = vertices[corners[:, 1:]] - vertices[corners[:, :1]]
     mean_edge = float(np.linalg.norm(arms[:, 0], axis=1).mean()) if len(corners) else 0.0
-    shortest = max(_LEAST_ALTITUDE * mean_edge, 1e-300)
+    shortest = max(_LEAST_ALTITUDE * mean_edge, 1e-100)  # whose square is not yet 0
     ups = directions[corners]
     up = ups.sum(axis=1)
     up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)

@@ -21,6 +21,7 @@ import numpy as np
 from deskew.errors import InputError, StepError, in_one_line, require
 from deskew.flattening.conformal import signed_areas
 from deskew.flattening.edges import Indices, edges_of
+from deskew.flattening.intrinsic import triangles
 from deskew.flattening.meshes import faces_from_above
 from deskew.flattening.placement import as_seen
 from deskew.flattening.topology import disc_of
@@ -92,7 +93,8 @@ def lscm_places(vertices: Floats, faces: Indices) -> Floats:
     border = faces.ravel()[opposite < 0]
     require(border.size > 0, "faces", "have a border", "a closed surface")
     first = border[np.argmax(((vertices[border] - vertices[border].mean(axis=0)) ** 2).sum(axis=1))]
-    last = border[np.argmax(((vertices[border] - vertices[first]) ** 2).sum(axis=1))]
+    others = border[border != first]
+    last = others[np.argmax(((vertices[others] - vertices[first]) ** 2).sum(axis=1))]
     held = np.array([first, last], dtype=np.int64)
     places, _ = igl.lscm(vertices, faces, held, np.array([[0.0, 0.0], [1.0, 0.0]]))
     return np.asarray(places * (_mean_edge(vertices, faces) / _mean_edge(places, faces)))
@@ -127,6 +129,10 @@ def _flattened(sheet: Sheet, places_of: Callable[[Floats, Indices], Floats], ite
     _igl()
     disc = disc_of(Sheet(*as_mesh(sheet)))
     vertices, faces = disc.vertices, faces_from_above(disc.vertices, disc.faces)
+    # Of faces without area only, libigl writes beyond its memory.
+    chords = np.linalg.norm(np.subtract(*vertices[disc.edges.ends.T]), axis=1)
+    solid = triangles(chords, disc.edges).n_mended < len(faces)
+    require(solid, "vertices", "span an area", "faces without area only")
     try:
         places = places_of(vertices, faces)
     except RuntimeError as error:

@@ -83,7 +83,7 @@ def smooth(hinges: Hinges, noisy: Floats, sigma_mm: float) -> Floats:
     (V,) array
         Offsets [mm].
     """
-    if not len(hinges.vertices):
+    if not len(hinges.lengths):  # a single face
         return noisy.copy()
     root = np.sqrt(sigma_mm / float(hinges.lengths.mean()))
     convex, sharp = (_CONVEX_EPS * root) ** 2, (_SHARP_EPS * root) ** 2

@@ -101,11 +101,40 @@ def test_what_is_no_surface_is_refused_by_name(name: str) -> None:
         deskew.flattening.flatten(make())
 
 
+@pytest.mark.parametrize("other", [(0, 2), (0, 9), (9, 9), (5, 0)])
+def test_a_grid_that_meets_itself_is_flattened_or_said_to_fold(other: tuple[int, int]) -> None:
+    """Vertices in one place that no spring joins; on a coarser grid one may."""
+    grid = cylinder(30.0, (10, 10))[0]
+    grid[0, 0] = grid[other]
+    flat = deskew.flatten(grid)
+    assert flat.status in (Status.AT_REST, Status.FOLDED)
+    assert np.isfinite(flat.vertices).all()
+
+
 def test_a_mesh_of_noise_ends_folded_and_says_so() -> None:
     rng = np.random.default_rng(2)
     flat = deskew.flatten(*as_triangles(rng.normal(size=(12, 12, 3))))
     assert flat.status is Status.FOLDED
     assert flat.counters["flips"] > 0
+    assert np.isfinite(flat.vertices).all()
+
+
+@pytest.mark.parametrize(
+    ("faces", "places"),
+    [
+        ([[0, 1, 2]], [[0, 0, 0], [9, 0, 0], [0, 9, 3]]),
+        ([[0, 1, 2], [2, 1, 3]], [[0, 0, 0], [9, 0, 0], [0, 9, 3], [9, 9, 0]]),
+        ([[0, 1, 2], [2, 1, 3]], [[0, 0, 0], [9, 0, 0], [9, 1e-7, 0], [9, 9, 0]]),
+    ],
+    ids=["one face", "two faces", "two faces and an edge of hardly any length"],
+)
+@pytest.mark.parametrize("noise_mm", [0.0, "auto", 0.3, 1000.0])
+def test_a_face_or_two_are_flat_whatever_noise_they_have(
+    faces: list[list[int]], places: list[list[float]], noise_mm: float | str
+) -> None:
+    vertices = np.array(places, dtype=float)
+    flat = deskew.flatten(vertices, np.array(faces), noise_mm=noise_mm)
+    assert flat.status is Status.AT_REST
     assert np.isfinite(flat.vertices).all()
 
 

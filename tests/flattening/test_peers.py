@@ -74,6 +74,15 @@ def test_faces_without_area_make_peers_diverge_and_say_so(name: str) -> None:
 
 
 @pytest.mark.usefixtures("igl")
+@pytest.mark.parametrize("name", PEERS)
+def test_peers_refuse_a_mesh_on_a_line(name: str) -> None:
+    """On which libigl writes beyond its memory."""
+    vertices, faces, _ = folded_mesh(12)
+    with pytest.raises(InputError, match="`vertices` must span an area, got faces without area only"):
+        PEERS[name](Sheet(vertices * [1.0, 0.0, 0.0], faces))
+
+
+@pytest.mark.usefixtures("igl")
 def test_libigl_failing_is_a_failed_step() -> None:
     vertices, faces, _ = folded_mesh(12)
     with pytest.raises(StepError, match=r"Flattening by libigl failed: RuntimeError: .*; use method `spring`\.$"):

@@ -133,7 +133,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
     "camera of no size": (lambda a: a.update(camera_size=np.array([np.nan, 8])), "camera_size` must be whole numbers"),
     "light with a slash": (lambda a: a.update({"image_x/y": a["image_white"]}), "image_LIGHT` must name its light"),
     "light without a name": (lambda a: a.update({"image_": a["image_white"]}), "image_LIGHT` must name its light"),
-    "stiffness negative": (lambda a: a["sheet_stiffness"].fill(-1), "`stiffness` must be in"),
+    "stiffness negative": (lambda a: a["sheet_stiffness"].fill(-1), r"`stiffness` must be in \[1e-09, 1e\+12\]"),
     "outline of three": (lambda a: a.update(outline=np.zeros((3, 2))), r"outline` must have shape \(4, 2\)"),
     "outline NaN": (lambda a: a["outline"].fill(np.nan), "`outline` must be finite"),
 }
