@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from deskew.errors import require
+from deskew.types import PatternKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,11 @@ BEST = Recipe("temporal", ink=True, denoise=True)
 """What serves rest lengths along the surface."""
 
 
-def recipe_for(method: str) -> Recipe:
-    """Return the recipe that belongs to a flattening method: the paper's to the paper's methods, else the best."""
-    return PAPER if method.startswith("paper_") else BEST
+def recipe_for(method: str, pattern: PatternKind = PatternKind.LINE_SWEEP) -> Recipe:
+    """Return the recipe that belongs to a flattening method: the paper's to the paper's methods, else the best.
+
+    A Gray code is not corrected for ink: its decoder leaves the edges of ink out, which on real captures is better than
+    to keep them for a correction.
+    """
+    own = PAPER if method.startswith("paper_") else BEST
+    return replace(own, ink=own.ink and pattern is not PatternKind.GRAY_CODE)

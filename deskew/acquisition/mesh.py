@@ -101,10 +101,10 @@ def page_mesh(
 
 
 def _refinement(outline: Outline, shape: tuple[int, int]) -> tuple[int, float]:
-    """Choose how many steps of the surface go to a quad, an even number or 1, and a crease's width in such steps."""
+    """Choose how many steps of the surface go to a quad, a power of 2, and a crease's width in such steps."""
     sides = ((outline.top, shape[1]), (outline.bottom, shape[1]), (outline.left, shape[0]), (outline.right, shape[0]))
     spacing = float(np.mean([np.linalg.norm(np.diff(side, axis=0), axis=1).sum() / (n - 1) for side, n in sides]))
-    n = max(1, 2 * round(spacing / SURFACE_STEP_PX / 2))
+    n = 2 ** max(0, round(np.log2(spacing / SURFACE_STEP_PX)))
     return n, CREASE_WIDTH_PX * n / spacing if n > 1 else 0.0
 
 

@@ -25,7 +25,6 @@ from deskew.cli.options import (
 from deskew.cli.pictures import PICTURES, Wanted, write_pictures
 from deskew.cli.printing import flattened_figures, projector_figures, report
 from deskew.cli.scanning import Scanning, scan_page
-from deskew.recipes import recipe_for
 
 if TYPE_CHECKING:
     from deskew.types import Scan
@@ -91,7 +90,7 @@ def run(
     io.require_writable(output, PICTURES)
     require_method(method)
     wanted = Wanted.of(output, lights, combine, scale)
-    how = Scanning.asked(shape, mask, recipe_for(method), ink, denoise, stiffness)
+    how = Scanning(shape, mask, method, ink, denoise, stiffness)
     restore_page(scan_page(capture, io.read_calibration(calibration), how, wanted), method, wanted, as_json)
 
 

@@ -14,7 +14,7 @@ from deskew.cli.options import CalibrationFile, CaptureFolder, Denoise, Ink, Jso
 from deskew.cli.pictures import Wanted
 from deskew.cli.printing import depth_figures, projector_figures, report, warn
 from deskew.errors import require
-from deskew.recipes import BEST, Recipe
+from deskew.recipes import Recipe, recipe_for
 
 if TYPE_CHECKING:
     from deskew.io import StiffnessMap
@@ -25,10 +25,14 @@ if TYPE_CHECKING:
         Correspondence,
         DepthMap,
         Frames,
+        PatternKind,
         ProjectorCheck,
         Scan,
         Sheet,
     )
+
+
+_METHOD = "spring"  # a scan that is kept is made for this one, unless the user says how
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,22 +70,16 @@ class Scanning:
 
     shape: tuple[int, int]
     mask: Path | None
-    recipe: Recipe
+    method: str
+    ink: bool | None
+    denoise: bool | None
     stiffness: Path | None = None
 
-    @classmethod
-    def asked(
-        cls,
-        shape: tuple[int, int],
-        mask: Path | None,
-        own: Recipe,
-        ink: bool | None,
-        denoise: bool | None,
-        stiffness: Path | None = None,
-    ) -> Scanning:
-        """Scan by the `own` recipe of a method, but for what the user says."""
-        ink, denoise = own.ink if ink is None else ink, own.denoise if denoise is None else denoise
-        return cls(shape, mask, replace(own, ink=ink, denoise=denoise), stiffness)
+    def recipe(self, pattern: PatternKind) -> Recipe:
+        """Return the method's own recipe, but for what the user says."""
+        own = recipe_for(self.method, pattern)
+        ink, denoise = own.ink if self.ink is None else self.ink, own.denoise if self.denoise is None else self.denoise
+        return replace(own, ink=ink, denoise=denoise)
 
     def page(self, size: tuple[int, int]) -> Array | None:
         """Read the mask, (height, width) bool."""
@@ -117,7 +115,7 @@ def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wan
     mask, materials = how.page(capture.camera_size), how.materials(capture.camera_size)
     from deskew import pipeline
 
-    found = pipeline.scan_by(how.recipe, capture, calibration, shape=how.shape, mask=mask)
+    found = pipeline.scan_by(how.recipe(capture.pattern), capture, calibration, shape=how.shape, mask=mask)
     warn(found.projector, folder.name)
     return found if materials is None else pipeline.with_stiffness(found, materials)
 
@@ -173,7 +171,7 @@ def scan(
     from deskew import io, projection
 
     io.require_writable(output, (".npz", ".ply"))
-    found = scan_page(capture, io.read_calibration(calibration), Scanning.asked(shape, mask, BEST, ink, denoise))
+    found = scan_page(capture, io.read_calibration(calibration), Scanning(shape, mask, _METHOD, ink, denoise))
     if output.suffix.lower() == ".npz":
         io.write_scan(found, output)
     else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from deskew.errors import require
-from deskew.flattening.springs import chord_lengths
+from deskew.flattening.chords import chord_lengths
 from deskew.types import Floats
 
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from deskew.flattening.chords import chord_lengths
 from deskew.flattening.multigrid import coarse_index, shares
-from deskew.flattening.springs import chord_lengths, spring_constants
+from deskew.flattening.springs import spring_constants
 from deskew.types import Floats
 
 # Stiffness of a quad of half the width.

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from deskew.errors import require
+from deskew.flattening.chords import chord_lengths
+from deskew.flattening.sections import unfolded_lengths
 from deskew.flattening.settings import SpringSettings
 from deskew.types import Array, Floats, Sheet
 from deskew.types.arrays import SHORTEST_MM
@@ -99,42 +100,6 @@ def _ends(values: Array, family: int) -> tuple[Array, Array]:
     return values[i : rows + i, j : columns + j], values[p : rows + p, q : columns + q]
 
 
-def chord_lengths(vertices: Floats) -> Floats:
-    """Length of every spring of a grid as the straight chord between its ends.
-
-    A chord is shorter than the paper it spans wherever the surface bends between two samples: this, not the
-    integration, is the largest error of the paper's method.
-
-    Parameters
-    ----------
-    vertices : (R, C, 3) array
-        Positions [mm].
-
-    Returns
-    -------
-    (4, R, C) array
-        Lengths [mm], by family, 0 where there is no spring.
-    """
-    lengths = np.zeros((4, *vertices.shape[:2]))
-    _measure_chords(np.ascontiguousarray(vertices, dtype=np.float64), lengths)
-    return lengths
-
-
-@njit(cache=True)
-def _measure_chords(vertices, lengths):  # type: ignore[no-untyped-def]
-    rows, columns = lengths.shape[1], lengths.shape[2]
-    for family in range(4):
-        # Tails and heads of the four families, spelled out for the compiler.
-        i, p, q = (1 if family == 3 else 0), (1 if family == 1 or family == 2 else 0), (0 if family == 1 else 1)
-        for r in range(rows - max(i, p)):
-            for c in range(columns - q):
-                dx = vertices[r + p, c + q, 0] - vertices[r + i, c, 0]
-                dy = vertices[r + p, c + q, 1] - vertices[r + i, c, 1]
-                dz = vertices[r + p, c + q, 2] - vertices[r + i, c, 2]
-                # Written as the force pass writes it, so that an unmoved spring exerts exactly no force.
-                lengths[family, r, c] = np.sqrt(dx * dx + dy * dy + dz * dz)
-
-
 def spring_constants(
     grid: tuple[int, int], k_s: float, quads: Floats | None = None, cut: npt.NDArray[np.bool_] | None = None
 ) -> Floats:
@@ -174,61 +139,6 @@ def spring_constants(
         constants[1, : rows - 1, :] *= whole[1:-1, :-1] | whole[1:-1, 1:]
         constants[2:, : rows - 1, : columns - 1] *= ~cut
     return constants
-
-
-def section_lengths(surface: Floats, n: int) -> Floats:
-    """Length of every spring of a grid as the arc that the surface takes between its ends.
-
-    The arc is followed along the finer samples: along their rows, their columns and their diagonals.
-
-    Parameters
-    ----------
-    surface : ((R - 1) n + 1, (C - 1) n + 1, 3) array
-        The surface, n steps to one of the grid [mm].
-    n : int
-        Steps of the surface between two neighbours of the grid.
-
-    Returns
-    -------
-    (4, R, C) array
-        Lengths [mm], by family, 0 where there is no spring.
-    """
-    fine = chord_lengths(surface)
-    rows, columns = (surface.shape[0] - 1) // n + 1, (surface.shape[1] - 1) // n + 1
-    lengths = np.zeros((4, rows, columns))
-    for step in range(n):
-        lengths[0, :, :-1] += fine[0, ::n, step::n][:, : columns - 1]
-        lengths[1, :-1, :] += fine[1, step::n, ::n][: rows - 1]
-        lengths[2, :-1, :-1] += fine[2, step::n, step::n][: rows - 1, : columns - 1]
-        lengths[3, :-1, :-1] += fine[3, n - 1 - step :: n, step::n][: rows - 1, : columns - 1]
-    return lengths
-
-
-def unfolded_lengths(surface: Floats, n: int, crease_width: float = 0.0) -> Floats:
-    """Length of every spring of a grid along the surface, with what its samples cut off at creases added.
-
-    A chord that crosses a crease cuts it off, wherever its samples happen to lie: on average by a length in proportion
-    to their step h, and a crease that the surface itself rounds over a width w by as much as a step longer by w would.
-    So the arc L(h), followed in steps of h, is extended to the step -w along the line through L(k h) and L(h).
-
-    Parameters
-    ----------
-    surface : ((R - 1) n + 1, (C - 1) n + 1, 3) array
-        The surface [mm].
-    n : int
-        Steps of the surface between two neighbours of the grid, at least 2; k is its smallest divisor.
-    crease_width : float
-        w / h, as in `Sheet`.
-
-    Returns
-    -------
-    (4, R, C) array
-        Lengths [mm], by family, 0 where there is no spring.
-    """
-    k = next(divisor for divisor in range(2, n + 1) if n % divisor == 0)
-    fine = section_lengths(surface, n)
-    coarse = section_lengths(np.ascontiguousarray(surface[::k, ::k]), n // k)
-    return np.asarray(fine + (1.0 + crease_width) / (k - 1) * (fine - coarse))
 
 
 def _two_steps(one: Floats, join: Callable[[Floats, Floats], Floats]) -> Floats:

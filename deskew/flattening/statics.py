@@ -18,6 +18,7 @@ import numpy as np
 from deskew.errors import require
 from deskew.flattening import energies
 from deskew.flattening.anderson import Iterated, accelerate
+from deskew.flattening.chords import chord_lengths
 from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
@@ -27,7 +28,7 @@ from deskew.flattening.multigrid import Hierarchy, framed, hierarchy, moved, unf
 from deskew.flattening.placement import as_seen, handedness, has_area
 from deskew.flattening.pyramid import Grid, pyramid, refined
 from deskew.flattening.settings import StaticSettings
-from deskew.flattening.springs import Springs, chord_lengths, grid_springs, spring_constants
+from deskew.flattening.springs import Springs, grid_springs, spring_constants
 from deskew.types import Flattened, Floats, Sheet, Status
 
 # Longest side of the level that the first, the second, ... search starts from [vertices]; at last the grid itself.

@@ -11,14 +11,16 @@ import cv2
 import numpy as np
 
 from deskew import acquisition, io, metrics, pipeline, projection, restoration
-from deskew.acquisition import BoardView, DepthSettings
+from deskew.acquisition import BoardView, DenoiseSettings, DepthSettings, InkSettings, Outline
 from deskew.errors import InputError, require
-from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Sheet
+from deskew.recipes import Recipe
+from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Scan, Sheet
 from experiments.reporting import Column, Layout, Montage
 from experiments.settings import Config
 from experiments.studies.bench import calibration_figures
 from experiments.studies.flattened import flattening_figures
 from experiments.studies.methods import require_methods
+from experiments.studies.recipes import methods_by_recipe
 from experiments.studies.scanned import scanned_points
 from experiments.studies.study import AbsentError, Study
 from experiments.trials import Outcome, Recorder, TrialKey, content_digest, trial_keys
@@ -143,20 +145,33 @@ def _measure_board(
         calibration, camera=_in_world(calibration.camera, R, t), projector=_in_world(calibration.projector, R, t)
     )
     outline = acquisition.straight_outline(_border(seen))
-    with record.stage("mesh"):
-        shape = (config.mesh.rows, config.mesh.columns)
-        scan = pipeline.scan(
-            capture, on_bed, decoded=decoded, shape=shape, outline=outline, depth=_DEPTH, max_hole_px=_INK_PX
-        )
-    for method in config.methods:
-        with record.attempt("restored", method):
-            with record.stage("restore", "restored", method):
-                restored = pipeline.restore(scan, method=method)
-            _measure_restored(record, method, scan.sheet, restored, seen)
-            if method == config.methods[0]:
-                name = f"board_{record.key.trial}"
-                record.picture(f"{name}_seen", restoration.undistorted_view(capture.white, calibration.camera))
-                record.picture(f"{name}_restored", _from_above(restored))
+    for recipe, methods in methods_by_recipe(config, capture.pattern).items():
+        with record.stage("mesh"):
+            scan = _meshed(config, recipe, capture, on_bed, outline)
+        for method in methods:
+            with record.attempt("restored", method):
+                with record.stage("restore", "restored", method):
+                    restored = pipeline.restore(scan, method=method)
+                _measure_restored(record, method, scan.sheet, restored, seen)
+                if method == config.methods[0]:
+                    name = f"board_{record.key.trial}"
+                    record.picture(f"{name}_seen", restoration.undistorted_view(capture.white, calibration.camera))
+                    record.picture(f"{name}_restored", _from_above(restored))
+
+
+def _meshed(config: Config, recipe: Recipe, capture: Capture, on_bed: Calibration, outline: Outline) -> Scan:
+    """Scan the board as its method asks."""
+    return pipeline.scan(
+        capture,
+        on_bed,
+        shape=(config.mesh.rows, config.mesh.columns),
+        outline=outline,
+        settings=pipeline.decoder_for(recipe, capture.pattern),
+        ink=InkSettings() if recipe.ink else None,
+        depth=_DEPTH,
+        denoise=DenoiseSettings() if recipe.denoise else None,
+        max_hole_px=_INK_PX,
+    )
 
 
 def _measure_restored(record: Recorder, method: str, sheet: Sheet, restored: Restoration, seeds: Floats) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from deskew.recipes import PAPER, Recipe, recipe_for
+from deskew.types import PatternKind
 from experiments.settings import Config, ScanSettings
 
 
@@ -21,9 +22,9 @@ def calibration_mode(config: Config) -> str:
     return "temporal" if "temporal" in modes else "spatial"
 
 
-def methods_by_recipe(config: Config) -> dict[Recipe, list[str]]:
-    """Return the methods under test, together where one scan serves them."""
+def methods_by_recipe(config: Config, pattern: PatternKind = PatternKind.LINE_SWEEP) -> dict[Recipe, list[str]]:
+    """Return the methods under test, together where one scan of captures of a pattern serves them."""
     grouped: dict[Recipe, list[str]] = {}
     for method in config.methods:
-        grouped.setdefault(configured(config.scan, recipe_for(method)), []).append(method)
+        grouped.setdefault(configured(config.scan, recipe_for(method, pattern)), []).append(method)
     return grouped

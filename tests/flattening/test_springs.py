@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from deskew.errors import InputError
+from deskew.flattening.chords import chord_lengths
+from deskew.flattening.sections import section_lengths, unfolded_lengths
 from deskew.flattening.settings import SpringSettings
-from deskew.flattening.springs import grid_springs, section_lengths, unfolded_lengths
-from deskew.types import Sheet
+from deskew.flattening.springs import grid_springs
+from deskew.types import Array, Sheet
 from tests.flattening.bent_sheets import cylinder, flat_grid
 
 
@@ -97,18 +99,35 @@ def test_sections_follow_an_arc_and_chords_cut_it_short() -> None:
     assert np.all(chord < arc * (1 - 2e-3))
 
 
+def ridge(place: float, noise_mm: float = 0.0) -> Array:
+    """A sheet of 100 x 60 mm with one crease of 50 degrees across it, 49 x 29 vertices, exactly isometric."""
+    flat = flat_grid((29, 49), (100.0, 60.0))
+    across = np.array([0.94, -0.342, 0.0])
+    beyond = flat @ across - place
+    steep = np.radians(25.0)
+    bent = flat + ((np.cos(steep) - 1.0) * beyond)[..., None] * across
+    bent[..., 2] -= np.sin(steep) * np.abs(beyond)
+    return bent + np.random.default_rng(0).normal(0.0, noise_mm, bent.shape) * [0, 0, 1]
+
+
 def test_unfolded_lengths_give_back_on_average_what_chords_cut_off_at_a_crease() -> None:
-    # A ridge of 50 degrees at a place that no sample knows.
-    missing, taken = [], []
-    for place in np.linspace(40.0, 60.0, 41):
-        u = np.linspace(0.0, 100.0, 49)
-        x = np.where(u < place, u * np.cos(0.4), place * np.cos(0.4) + (u - place) * np.cos(0.5))
-        z = np.where(u < place, u * np.sin(0.4), place * np.sin(0.4) - (u - place) * np.sin(0.5))
-        surface = np.stack(np.broadcast_arrays(x, -np.linspace(0, 50, 13)[:, None], z), axis=-1)
-        missing.append(100.0 - section_lengths(surface, 4)[0, 0, :-1].sum())
-        taken.append(100.0 - unfolded_lengths(surface, 4)[0, 0, :-1].sum())
-    assert np.mean(missing) > 0.05
-    assert abs(np.mean(taken)) < 0.1 * np.mean(missing)
+    true = chord_lengths(flat_grid((8, 13), (100.0, 60.0)))
+    cut, left = [], []
+    for place in np.linspace(30.0, 70.0, 41):
+        surface = ridge(place)
+        cut.append((true - section_lengths(surface, 4)).sum())
+        left.append((true - unfolded_lengths(surface, 4)).sum())
+    assert np.mean(cut) > 1.0
+    assert abs(np.mean(left)) < 0.1 * np.mean(cut)
+
+
+def test_a_surface_that_noise_makes_longer_is_followed_no_further_than_it_pays() -> None:
+    true = chord_lengths(flat_grid((8, 13), (100.0, 60.0)))
+    for place in (37.0, 50.0, 61.0):
+        noisy = ridge(place, 0.4)
+        longer = section_lengths(noisy, 4).sum() - true.sum()
+        assert longer > 20.0  # of 1,600 mm of springs
+        assert abs(unfolded_lengths(noisy, 4).sum() - true.sum()) < 0.4 * longer
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(5, 7), (3, 3)])

@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 import deskew
 from deskew.errors import InputError
 from deskew.flattening import StaticSettings, energies, flatten
+from deskew.flattening.chords import chord_lengths
 from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.laplace import laplacian
 from deskew.flattening.multigrid import framed, unframed
 from deskew.flattening.settings import SpringSettings
-from deskew.flattening.springs import Springs, chord_lengths, grid_springs
+from deskew.flattening.springs import Springs, grid_springs
 from deskew.types import Array, Sheet, Status
 from tests.flattening.bent_sheets import cylinder, flat_grid, mirror_folds, rigid_error
 
