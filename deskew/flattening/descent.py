@@ -20,7 +20,7 @@ from deskew.types import Floats
 _RIDGE = 1e-9  # of the Laplacian's diagonal: neither moving nor turning a whole piece costs anything
 _SHORTEST_STEP = 1e-6
 _PATIENCE = 300  # local and global steps after which Newton's method may have a try
-_LAST_STEPS = 20
+_LAST_STEPS = 40
 
 
 def minimise(
@@ -39,14 +39,14 @@ def minimise(
     step_mm : float
         Largest change of a coordinate that counts as none [mm].
     max_iterations : int
-        Steps after which to give up; from 300 on, Newton's method may add 20.
+        Steps after which to give up; where 300 are allowed and not enough, at most 40 of Newton's method end it.
     uneven : bool
         Whether the stiffness varies so strongly that only Newton's method will do.
     """
     if uneven:
         return newton(model, system.matrix, start, step_mm, max_iterations)
     # The best vectors of the edges, then the best places for them; the system was factored once.
-    found = accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, max_iterations)
+    found = accelerate(lambda x: system.solve(model.pull(x)), start, step_mm, min(max_iterations, _PATIENCE))
     if found.converged or max_iterations < _PATIENCE or not np.isfinite(found.x).all():
         return found
     # Parts that are squeezed keep the steps circling; a line search does not circle.

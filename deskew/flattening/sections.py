@@ -6,7 +6,7 @@ arc L(h), followed in steps of h, is extended to the step -w along the line thro
 
 Noise has the opposite law: it lengthens the arc the more, the shorter the steps. How much longer each refinement makes
 the whole sheet, per step saved, tells the two apart: about the same each time with creases, less and less on smooth
-bends, eight times as much at every halving with noise. Steps are shortened only as far as this holds.
+bends, eight times as much at every halving with noise. The shortest steps are taken at which it is still so.
 """
 
 from __future__ import annotations
@@ -66,18 +66,28 @@ def unfolded_lengths(surface: Floats, n: int, crease_width: float = 0.0) -> Floa
     (4, R, C) array
         Lengths [mm], by family, 0 where there is no spring: plain chords where even the first refinement adds noise.
     """
-    coarse, step = chord_lengths(surface[::n, ::n]), n
-    lengths, slope = coarse, _slope_of_grid(surface[::n, ::n], n)
-    while step > 1:
-        divisor = next(k for k in range(2, step + 1) if step % k == 0)
-        finer = step // divisor
-        fine = section_lengths(np.ascontiguousarray(surface[::finer, ::finer]), n // finer)
-        gain = _total(fine) - _total(coarse)
-        if gain > _CREASED * slope * (step - finer):
-            break
-        lengths = fine + (finer + crease_width) / (step - finer) * (fine - coarse)
-        coarse, slope, step = fine, gain / (step - finer), finer
-    return lengths
+    steps = _halved(n)
+    arcs = [chord_lengths(surface[::n, ::n])]
+    arcs += [section_lengths(np.ascontiguousarray(surface[::k, ::k]), n // k) for k in steps[1:]]
+    slopes = [_slope_of_grid(surface[::n, ::n], n)]
+    for i in range(1, len(steps)):
+        slopes.append((_total(arcs[i]) - _total(arcs[i - 1])) / (steps[i - 1] - steps[i]))
+    creased = [True] + [slopes[i] <= _CREASED * slopes[i - 1] for i in range(1, len(steps))]
+    # Noise shows in the finest steps, folds closer than the coarse ones in those: two refinements in a row decide.
+    best = next((i for i in range(len(steps) - 1, 0, -1) if creased[i] and creased[i - 1]), 0)
+    if best == 0:
+        return arcs[0]
+    step, saved = steps[best], steps[best - 1] - steps[best]
+    return np.asarray(arcs[best] + (step + crease_width) / saved * (arcs[best] - arcs[best - 1]))
+
+
+def _halved(n: int) -> list[int]:
+    """Return steps from n down to 1, each the one before by its smallest divisor."""
+    steps = [n]
+    while steps[-1] > 1:
+        step = steps[-1]
+        steps.append(step // next(k for k in range(2, step + 1) if step % k == 0))
+    return steps
 
 
 def _total(lengths: Floats) -> float:
