@@ -103,7 +103,7 @@ def _hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: igno
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _offsets(family, columns):  # type: ignore[no-untyped-def]
+def spring_offsets(family, columns):  # type: ignore[no-untyped-def]
     """Return where a family's springs begin and end, counted in vertices from the one that they are stored at."""
     steps = 1 if family < 4 else 2
     tail = steps * columns if family % 4 == 3 else 0
@@ -115,7 +115,7 @@ def _offsets(family, columns):  # type: ignore[no-untyped-def]
 def _pull_far(x, v, physics, inverse_mass, out):  # type: ignore[no-untyped-def]
     """Add what the springs of two steps do (eqs. 1 and 2); few use them, so they take the plain way."""
     for family in range(4, len(physics.k_s)):
-        tail, head = _offsets(family, physics.columns)
+        tail, head = spring_offsets(family, physics.columns)
         for i in range(x.shape[1] - max(tail, head)):
             k_s = physics.k_s[family, i]
             if k_s > 0.0:
@@ -185,7 +185,7 @@ def spring_energy(x, physics):  # type: ignore[no-untyped-def]
     n, columns = x.shape[1], physics.columns
     energy = 0.0
     for family in range(len(physics.k_s)):
-        tail, head = _offsets(family, columns)
+        tail, head = spring_offsets(family, columns)
         for i in range(n - max(tail, head)):
             k_s = physics.k_s[family, i]
             if k_s > 0.0:

@@ -139,6 +139,9 @@ class ParticleSettings:
         Steps after which the sheet counts as locked, in [1, 1e9].
     halving : str
         Reading of the paper's step halving, "working" or "literal" (see `contact`).
+    tolerance_mm : float
+        Error that an embedded pair may estimate for a step of any coordinate [mm], > 0; it chooses its steps by that,
+        up to `dt`. Other integrators make equal steps.
     rest, bending, more
         As in `SpringSettings`.
     """
@@ -154,13 +157,14 @@ class ParticleSettings:
     eps_mm: float = 0.05
     max_steps: int = 40_000
     halving: str = "working"
+    tolerance_mm: float = 1e-3
     rest: str = "chord"
     bending: float = 0.0
     more: float = 0.0
 
     def __post_init__(self) -> None:
         _ = self.springs
-        for name, unit in (("mass", "kg"), ("eps_mm", "mm"), ("dt", "s")):
+        for name, unit in (("mass", "kg"), ("eps_mm", "mm"), ("tolerance_mm", "mm"), ("dt", "s")):
             value = getattr(self, name)
             if name != "dt" or value is not None:
                 require_constant(name, value, unit)
