@@ -132,6 +132,17 @@ def _pull_far(x, v, physics, inverse_mass, out):  # type: ignore[no-untyped-def]
                     out[axis, b] -= pull
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _begin(v, physics, inverse_mass, start, stop, out):  # type: ignore[no-untyped-def]
+    """Write drag and downward acceleration of vertices start..stop."""
+    slowing = physics.drag * inverse_mass
+    for j in range(uintp(stop - start)):
+        i = j + uintp(start)
+        out[0, i] = -slowing * v[0, i]
+        out[1, i] = -slowing * v[1, i]
+        out[2, i] = -slowing * v[2, i] - physics.gravity
+
+
 @njit(cache=True, error_model="numpy")
 def accelerate(x, v, physics, work, out):  # type: ignore[no-untyped-def]
     """Acceleration of every particle, f / m of eq. 5.
@@ -150,13 +161,13 @@ def accelerate(x, v, physics, work, out):  # type: ignore[no-untyped-def]
     n, columns = x.shape[1], physics.columns
     rest, k_s, beta = physics.rest, physics.k_s, physics.beta
     inverse = 1.0 / physics.mass
-    slowing = physics.drag * inverse
-    for i in range(n):
-        out[0, i] = -slowing * v[0, i]
-        out[1, i] = -slowing * v[1, i]
-        out[2, i] = -slowing * v[2, i] - physics.gravity
-    for start in range(0, n - 1, CHUNK):
-        row = min(start + CHUNK, n - 1)
+    begun = 0
+    for start in range(0, n, CHUNK):
+        # Only now, so that what the chunk adds to is still in the cache.
+        reach = min(n, start + CHUNK + columns + 1)
+        _begin(v, physics, inverse, begun, reach, out)
+        begun = reach
+        row = max(start, min(start + CHUNK, n - 1))
         down = max(start, min(start + CHUNK, n - columns))
         shear = max(start, min(start + CHUNK, n - columns - 1))
         _pull(x, v, k_s[0], rest[0], beta, inverse, 0, 1, start, row, work, 0)
