@@ -39,13 +39,18 @@ DT_IMPLICIT = 4.0
 # The step is never halved further than this share of the full one; literal halving goes on until it is absurd.
 DT_FLOOR = {"working": 2.0**-10, "literal": 1e-12}
 
-_DAMPING_RATIO = 0.8
-_PUSH = 0.5
 _DRAG = 3.0
 _SINKING = 0.5
 
-HISTORY = ("time_s", "spring_energy_uj", "kinetic_energy_uj", "potential_energy_uj", "height_max_mm")
-"""What is kept of a run, at its start and after every window of steps; potential energy is of the strong push."""
+HISTORY = (
+    "time_s",
+    "force_evaluations",
+    "spring_energy_uj",
+    "kinetic_energy_uj",
+    "potential_energy_uj",
+    "height_max_mm",
+)
+"""What is kept of a run, at its start and after every stride; the potential energy is that of the strong push."""
 
 _REMEDY = {
     Status.LOCKED: "Particles hang {z:.2f} mm above the plane in a buckle that holds: raise `gravity`.",
@@ -71,8 +76,8 @@ class Constants:
         Contact with the bed.
     pace : Pace
         Full step, the least that it may be halved to, and what an embedded pair takes for exact.
-    window : int
-        Steps after which the state is looked at.
+    window, stride : int
+        Steps after which the sheet is looked at for rest, and after which the history gets an entry.
     """
 
     physics: System
@@ -80,6 +85,7 @@ class Constants:
     plane: Plane
     pace: Pace
     window: int
+    stride: int
 
 
 def folded_quads(xy: Floats, cut: npt.NDArray[np.bool_] | None = None) -> int:
@@ -112,10 +118,10 @@ def choose_constants(springs: Springs, x: Array, integrator: Scheme | Outside, s
     """
     k, mass = springs.k_max, settings.mass
     drag = _DRAG * np.sqrt(k * mass) / max(springs.grid) if settings.drag is None else settings.drag
-    gravity = _PUSH * k * springs.rest_mean / mass if settings.gravity is None else settings.gravity
+    gravity = settings.push * k * springs.rest_mean / mass if settings.gravity is None else settings.gravity
     physics = system(springs, beta=0.0, mass=mass, gravity=gravity, drag=drag)
     lam_max = stiffest_mode(x, physics)
-    beta = 2 * _DAMPING_RATIO / np.sqrt(lam_max) if settings.k_d is None else settings.k_d / k
+    beta = 2 * settings.damping_ratio / np.sqrt(lam_max) if settings.k_d is None else settings.k_d / k
     dt = settings.dt
     if dt is None:
         limit = largest_stable_step(integrator, lam_max, beta, drag / mass)
@@ -126,7 +132,8 @@ def choose_constants(springs: Springs, x: Array, integrator: Scheme | Outside, s
     pace = Pace(float(dt), float(dt * DT_FLOOR[settings.halving]), float(settings.tolerance_mm))
     implicit = isinstance(integrator, Scheme) and integrator.implicit
     window = round(WINDOW / DT_IMPLICIT) if implicit else WINDOW
-    return Constants(physics._replace(beta=float(beta)), float(weak), plane, pace, window)
+    stride = window if settings.stride is None else settings.stride
+    return Constants(physics._replace(beta=float(beta)), float(weak), plane, pace, window, stride)
 
 
 def settle(sheet: Sheet, integrator: Scheme | Outside, settings: ParticleSettings) -> Flattened:
@@ -187,23 +194,26 @@ def _run_to_rest(
     physics, plane, pace = constants.physics, constants.plane, constants.pace
     weak = physics._replace(gravity=constants.weak_gravity)
     scale = 0.5 * float((physics.k_s * physics.rest**2).sum())  # energy of every spring at a strain of 1
-    before = np.inf
+    before, began, due = np.inf, 0.0, constants.window
     history.append(_state(run, physics))
     while True:
-        began, left = run.clock[1], max_steps - run.counts[STEPS]
         pushing = weak if run.x[2].max() < plane.eps else physics
-        if not _advance(run, integrator, pushing, plane, pace, min(constants.window, left)):
+        n_steps = min(constants.stride, due - run.counts[STEPS], max_steps - run.counts[STEPS])
+        if not _advance(run, integrator, pushing, plane, pace, n_steps):
             return Status.LOCKED, _COLLAPSED.format(dt=run.clock[0], steps=run.counts[STEPS]), True
         history.append(_state(run, physics))
-        _, energy, kinetic, _, _ = history[-1]
+        _, _, energy, kinetic, _, _ = history[-1]
         if not energy < RUNAWAY_STRAIN**2 * scale:  # NaN included
             return Status.DIVERGED, _REMEDY[Status.DIVERGED], False
+        spent = run.counts[STEPS] >= max_steps
+        if run.counts[STEPS] < due and not spent:
+            continue
         reference = max(energy, NEGLIGIBLE_STRAIN**2 * scale)
         # Two hundred tiny steps show no change either: the window must have lasted.
         still = run.clock[1] - began >= SHORTEST_WINDOW * constants.window * pace.dt_max
         still = still and abs(energy - before) <= ENERGY_CHANGE * reference and kinetic <= KINETIC_SHARE * reference
-        before = energy
-        if still or run.counts[STEPS] >= max_steps:
+        before, began, due = energy, run.clock[1], due + constants.window
+        if still or spent:
             return *_outcome(run, springs, plane, still), False
 
 
@@ -215,10 +225,11 @@ def _advance(run: Run, integrator: Scheme | Outside, physics: System, plane: Pla
 
 
 def _state(run: Run, physics: System) -> tuple[float, ...]:
-    """Time, energies and the greatest height, in the order of `HISTORY`."""
+    """Return what the history holds, in its order."""
     kinetic = 0.5 * physics.mass * float((run.v**2).sum())
     potential = physics.mass * physics.gravity * float(run.x[2].sum())
-    return float(run.clock[1]), float(spring_energy(run.x, physics)), kinetic, potential, float(run.x[2].max())
+    spring = float(spring_energy(run.x, physics))
+    return float(run.clock[1]), float(run.counts[EVALUATIONS]), spring, kinetic, potential, float(run.x[2].max())
 
 
 def _outcome(run: Run, springs: Springs, plane: Plane, still: bool) -> tuple[Status, str]:
