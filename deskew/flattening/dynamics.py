@@ -199,7 +199,7 @@ def _run_to_rest(
     while True:
         pushing = weak if run.x[2].max() < plane.eps else physics
         n_steps = min(constants.stride, due - run.counts[STEPS], max_steps - run.counts[STEPS])
-        if not _advance(run, integrator, pushing, plane, pace, n_steps):
+        if not advance_by(run, integrator, pushing, plane, pace, n_steps):
             return Status.LOCKED, _COLLAPSED.format(dt=run.clock[0], steps=run.counts[STEPS]), True
         history.append(_state(run, physics))
         _, _, energy, kinetic, _, _ = history[-1]
@@ -217,8 +217,8 @@ def _run_to_rest(
             return *_outcome(run, springs, plane, still), False
 
 
-def _advance(run: Run, integrator: Scheme | Outside, physics: System, plane: Plane, pace: Pace, n_steps: int) -> bool:
-    """Advance by whichever loop the integrator has."""
+def advance_by(run: Run, integrator: Scheme | Outside, physics: System, plane: Plane, pace: Pace, n_steps: int) -> bool:
+    """Advance by whichever loop the integrator has; see :func:`.integrators.advance`."""
     if isinstance(integrator, Outside):
         return advance_outside(run, integrator, physics, plane, pace, n_steps)
     return bool(advance(run, integrator, physics, plane, pace, n_steps))

@@ -87,8 +87,11 @@ def _pull(x, v, k_s, rest, beta, inverse_mass, tail, head, start, stop, pulls, s
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: ignore[no-untyped-def]
+def hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: ignore[no-untyped-def]
     """Add a chunk's pulls to its tails and subtract them from its heads (eq. 2)."""
+    # In the last rows the downward families end earlier than the rows do.
+    pulls[3:6, n_down:n_row] = 0.0
+    pulls[6:12, n_shear:n_row] = 0.0
     for axis in range(3):
         row, down = pulls[axis], pulls[3 + axis]
         falling, rising = pulls[6 + axis], pulls[9 + axis]
@@ -174,10 +177,7 @@ def accelerate(x, v, physics, work, out):  # type: ignore[no-untyped-def]
         _pull(x, v, k_s[1], rest[1], beta, inverse, 0, columns, start, down, work, 3)
         _pull(x, v, k_s[2], rest[2], beta, inverse, 0, columns + 1, start, shear, work, 6)
         _pull(x, v, k_s[3], rest[3], beta, inverse, columns, 1, start, shear, work, 9)
-        # In the last rows the downward families end earlier than the rows do.
-        work[3:6, down - start : row - start] = 0.0
-        work[6:12, shear - start : row - start] = 0.0
-        _hand_out(work, start, row - start, down - start, shear - start, columns, out)
+        hand_out(work, start, row - start, down - start, shear - start, columns, out)
     if len(k_s) > 4:
         _pull_far(x, v, physics, inverse, out)
 

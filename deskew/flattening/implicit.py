@@ -13,9 +13,9 @@ their paper).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numba import njit, uintp
 
-from deskew.flattening.forces import accelerate, spring_offsets
+from deskew.flattening.forces import CHUNK, accelerate, hand_out, spring_offsets
 
 N_KRYLOV = 5
 _RESIDUAL, _N_PRODUCTS = 1e-5, 500
@@ -23,31 +23,44 @@ _RESIDUAL, _N_PRODUCTS = 1e-5, 500
 _N_CONTACT = 4
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _stiff_pull(x, p, k_s, rest, along, across, tail, head, start, stop, pulls, slot):  # type: ignore[no-untyped-def]
+    """Write what a displacement p of springs start..stop does to their tails, against it, into pulls[slot : slot + 3]."""
+    for j in range(uintp(stop - start)):
+        i = j + uintp(start)
+        a, b = i + uintp(tail), i + uintp(head)
+        dx, dy, dz = x[0, b] - x[0, a], x[1, b] - x[1, a], x[2, b] - x[2, a]
+        px, py, pz = p[0, b] - p[0, a], p[1, b] - p[1, a], p[2, b] - p[2, a]
+        squared = dx * dx + dy * dy + dz * dz
+        sideways = across * k_s[i] * max(0.0, 1.0 - rest[i] / np.sqrt(squared))
+        lengthways = (along * k_s[i] - sideways) * (dx * px + dy * py + dz * pz) / squared
+        there = k_s[i] > 0.0
+        pulls[slot, j] = -(lengthways * dx + sideways * px) if there else 0.0
+        pulls[slot + 1, j] = -(lengthways * dy + sideways * py) if there else 0.0
+        pulls[slot + 2, j] = -(lengthways * dz + sideways * pz) if there else 0.0
+
+
 @njit(cache=True, error_model="numpy")
-def _stiffen(x, p, physics, along, across, out):  # type: ignore[no-untyped-def]
-    """Add the springs' K / m times p : (3, V), its part along each spring times `along`, that across times `across`."""
-    n = x.shape[1]
-    for family in range(len(physics.k_s)):
-        tail, head = spring_offsets(family, physics.columns)
+def _stiffen(x, p, physics, along, across, work, out):  # type: ignore[no-untyped-def]
+    """Add K / m times p : (3, V), each spring's part along itself times `along`, the one across times `across`."""
+    n, columns, k_s, rest = x.shape[1], physics.columns, physics.k_s, physics.rest
+    along, across = along / physics.mass, across / physics.mass
+    for start in range(0, n, CHUNK):
+        row = max(start, min(start + CHUNK, n - 1))
+        down = max(start, min(start + CHUNK, n - columns))
+        shear = max(start, min(start + CHUNK, n - columns - 1))
+        _stiff_pull(x, p, k_s[0], rest[0], along, across, 0, 1, start, row, work, 0)
+        _stiff_pull(x, p, k_s[1], rest[1], along, across, 0, columns, start, down, work, 3)
+        _stiff_pull(x, p, k_s[2], rest[2], along, across, 0, columns + 1, start, shear, work, 6)
+        _stiff_pull(x, p, k_s[3], rest[3], along, across, columns, 1, start, shear, work, 9)
+        hand_out(work, start, row - start, down - start, shear - start, columns, out)
+    for family in range(4, len(k_s)):
+        tail, head = spring_offsets(family, columns)
         for i in range(n - max(tail, head)):
-            k_s = physics.k_s[family, i]
-            if k_s <= 0.0:
-                continue
-            a, b = i + tail, i + head
-            dx, dy, dz = x[0, b] - x[0, a], x[1, b] - x[1, a], x[2, b] - x[2, a]
-            squared = dx * dx + dy * dy + dz * dz
-            px, py, pz = p[0, b] - p[0, a], p[1, b] - p[1, a], p[2, b] - p[2, a]
-            slack = max(0.0, 1.0 - physics.rest[family, i] / np.sqrt(squared)) * across
-            turned = (along - slack) * (dx * px + dy * py + dz * pz) / squared
-            unit = k_s / physics.mass
-            fx, fy, fz = (
-                unit * (turned * dx + slack * px),
-                unit * (turned * dy + slack * py),
-                unit * (turned * dz + slack * pz),
-            )
-            out[0, a], out[0, b] = out[0, a] - fx, out[0, b] + fx
-            out[1, a], out[1, b] = out[1, a] - fy, out[1, b] + fy
-            out[2, a], out[2, b] = out[2, a] - fz, out[2, b] + fz
+            _stiff_pull(x, p, k_s[family], rest[family], along, across, tail, head, i, i + 1, work, 0)
+            for axis in range(3):
+                out[axis, i + tail] += work[axis, 0]
+                out[axis, i + head] -= work[axis, 0]
 
 
 @njit(cache=True, error_model="numpy")
@@ -57,7 +70,7 @@ def _product(run, physics, h, p, out):  # type: ignore[no-untyped-def]
     for axis in range(3):
         for i in range(p.shape[1]):
             out[axis, i] = slowed * p[axis, i]
-    _stiffen(run.x, p, physics, h * (physics.beta + h), h * h, out)
+    _stiffen(run.x, p, physics, h * (physics.beta + h), h * h, run.work, out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -139,7 +152,7 @@ def implicit_euler(run, physics, plane, h):  # type: ignore[no-untyped-def]
     for axis in range(3):
         for i in range(dv.shape[1]):
             right[axis, i] = 0.0
-    _stiffen(run.x, run.v, physics, h * h, h * h, right)
+    _stiffen(run.x, run.v, physics, h * h, h * h, run.work, right)
     for axis in range(3):
         for i in range(dv.shape[1]):
             right[axis, i] = h * a[axis, i] - right[axis, i]
@@ -154,4 +167,7 @@ def implicit_euler(run, physics, plane, h):  # type: ignore[no-untyped-def]
         for i in range(dv.shape[1]):
             run.stage[1][axis, i] = run.v[axis, i] + dv[axis, i]
             run.stage[0][axis, i] = run.x[axis, i] + h * run.stage[1][axis, i]
+    for i in range(dv.shape[1]):
+        if landed[i] != 0.0:  # it strikes the plane as fast as it would have without one: restitution is for `collide`
+            run.stage[1][2, i] = min(run.v[2, i] + h * a[2, i], 0.0)
     return n_evaluations

@@ -69,7 +69,7 @@ STEPS, REJECTED, EVALUATIONS, CONTACTS, GOOD = range(5)
 
 def start(vertices: Array, scheme: Scheme, dt: float) -> Run:
     """Make the arrays of a run that begins at rest at `vertices` : (..., 3) [mm] with step `dt` [s]."""
-    x = np.ascontiguousarray(vertices.reshape(-1, 3).T, dtype=np.float64)
+    x = np.array(vertices.reshape(-1, 3).T, dtype=np.float64, order="C")
     accelerations = np.zeros((len(scheme.c), *x.shape))
     krylov = np.zeros((N_KRYLOV, 3, x.shape[1] if scheme.implicit else 0))
     clock, counts = np.array([dt, 0.0, dt]), np.zeros(5, np.int64)
