@@ -25,7 +25,7 @@ _N_CONTACT = 4
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _stiff_pull(x, p, k_s, rest, along, across, tail, head, start, stop, pulls, slot):  # type: ignore[no-untyped-def]
-    """Write what a displacement p of springs start..stop does to their tails, against it, into pulls[slot : slot + 3]."""
+    """Write what a displacement p of springs start..stop does to their tails, against it, into three rows of pulls."""
     for j in range(uintp(stop - start)):
         i = j + uintp(start)
         a, b = i + uintp(tail), i + uintp(head)
@@ -127,6 +127,14 @@ def _land(run, plane, h, landed):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
+def _clear(rows):  # type: ignore[no-untyped-def]
+    """Set (3, V) to 0."""
+    for axis in range(3):
+        for i in range(uintp(rows.shape[1])):
+            rows[axis, i] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def implicit_euler(run, physics, plane, h):  # type: ignore[no-untyped-def]
     """Propose one step: new positions to stage[0], new velocities to stage[1].
 
@@ -146,28 +154,26 @@ def implicit_euler(run, physics, plane, h):  # type: ignore[no-untyped-def]
     int
         Force evaluations and products with the stiffness, which cost as much.
     """
-    a, right = run.accelerations[0], run.stage[0]
-    dv, landed = run.krylov[0], run.krylov[4, 0]
+    a, right, dv, landed = run.accelerations[0], run.stage[0], run.krylov[0], run.krylov[4, 0]
     accelerate(run.x, run.v, physics, run.work, a)
-    for axis in range(3):
-        for i in range(dv.shape[1]):
-            right[axis, i] = 0.0
+    _clear(right)
     _stiffen(run.x, run.v, physics, h * h, h * h, run.work, right)
     for axis in range(3):
         for i in range(dv.shape[1]):
             right[axis, i] = h * a[axis, i] - right[axis, i]
-            dv[axis, i] = 0.0
-            landed[i] = 0.0
+    _clear(run.krylov[0])
+    _clear(run.krylov[4])
     n_evaluations = 2
     for _ in range(_N_CONTACT):
         n_evaluations += _solve(run, physics, h, right, landed)
         if _land(run, plane, h, landed) == 0:
             break
+    X, V = run.stage[0], run.stage[1]
     for axis in range(3):
         for i in range(dv.shape[1]):
-            run.stage[1][axis, i] = run.v[axis, i] + dv[axis, i]
-            run.stage[0][axis, i] = run.x[axis, i] + h * run.stage[1][axis, i]
+            V[axis, i] = run.v[axis, i] + dv[axis, i]
+            X[axis, i] = run.x[axis, i] + h * V[axis, i]
     for i in range(dv.shape[1]):
         if landed[i] != 0.0:  # it strikes the plane as fast as it would have without one: restitution is for `collide`
-            run.stage[1][2, i] = min(run.v[2, i] + h * a[2, i], 0.0)
+            V[2, i] = min(run.v[2, i] + h * a[2, i], 0.0)
     return n_evaluations

@@ -15,6 +15,7 @@ STUDIES = {
     "textures": "experiments.studies.textures:TexturesStudy",
     "real_boards": "experiments.studies.real_boards:RealBoards",
     "surfaces": "experiments.studies.surfaces:Surfaces",
+    "integrators": "experiments.studies.integrators:Integrators",
     "speed": "experiments.studies.speed:Speed",
 }
 

@@ -1,4 +1,4 @@
-"""Problems for integrators that have a known answer: a sheet thrown into the air, balls that bounce, a sheet in peace."""
+"""Problems for integrators that have a known answer: a sheet thrown into the air, and balls that bounce."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ Integrator = Scheme | Outside
 _ANY_ERROR = 1e300
 _GRID, _SIDE_MM, _SLOPE_P90_DEG = 21, 216.0, 20.0
 _MASS_KG = 2.4e-6
+_PUSH = 0.05  # weight of a vertex over k_s times a spring's length
 # Throw of a vertex: standard deviation of its velocity, as a share of what crosses a spring's length in 1 / omega.
 _THROW = 0.02
 
@@ -58,7 +59,7 @@ def thrown_sheet(rng: np.random.Generator, damping_ratio: float, k_s: float = 1.
     springs = grid_springs(Sheet(grid.vertices), SpringSettings(k_s))
     x = np.ascontiguousarray(grid.vertices.reshape(-1, 3).T)
     drag = float(np.sqrt(k_s * _MASS_KG)) / _GRID
-    physics = system(springs, beta=0.0, mass=_MASS_KG, gravity=0.05 * k_s * springs.rest_mean / _MASS_KG, drag=drag)
+    physics = system(springs, beta=0.0, mass=_MASS_KG, gravity=_PUSH * k_s * springs.rest_mean / _MASS_KG, drag=drag)
     omega = float(np.sqrt(stiffest_mode(x, physics)))
     v = rng.normal(0.0, _THROW * springs.rest_mean * omega, x.shape)
     return Flight(x, v, physics._replace(beta=2 * damping_ratio / omega), unit_s=2 / omega)
@@ -67,6 +68,12 @@ def thrown_sheet(rng: np.random.Generator, damping_ratio: float, k_s: float = 1.
 def free(flight: Flight) -> Flight:
     """Return a flight without damping, drag and gravity: its energy is kept."""
     return Flight(flight.x, flight.v, flight.physics._replace(beta=0.0, drag=0.0, gravity=0.0), unit_s=flight.unit_s)
+
+
+def trembling(flight: Flight, rng: np.random.Generator) -> Flight:
+    """Return a flight's sheet all but at rest, without gravity: what grows then, the integrator has made."""
+    x = flight.x + rng.normal(0.0, 1e-6, flight.x.shape)
+    return Flight(x, np.zeros_like(x), flight.physics._replace(gravity=0.0), unit_s=flight.unit_s)
 
 
 def bouncing_balls(n: int = 64, gravity: float = 10.0, k_r: float = 0.5) -> Flight:
