@@ -14,10 +14,12 @@ from data_synth.patterns import default_fringes
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
+from data_synth.texts import N_LETTERS, Text, page_words
 from data_synth.truth import Truth
 
 __all__ = [
     "BOARD",
+    "N_LETTERS",
     "PAGE_SIZE_MM",
     "BallPlate",
     "Blank",
@@ -31,6 +33,7 @@ __all__ = [
     "Page",
     "Rig",
     "RigConfig",
+    "Text",
     "TrueSheet",
     "Truth",
     "View",
@@ -44,6 +47,7 @@ __all__ = [
     "flat_sheet",
     "glyph",
     "hidden_manuscript",
+    "page_words",
     "photograph",
     "plane",
     "posed",

@@ -90,7 +90,7 @@ class SheetSettings(Checked):
 
     group: ClassVar[str] = "sheet."
     kind: str = choice("mirror", "mirror")
-    slope_p90_deg: float = number(20.0, 1.0, 35.0, "degrees")
+    slope_p90_deg: float = number(20.0, 1.0, 45.0, "degrees")
     paths: list[str] = setting(
         [], "be a list of NPZ files, one a trial", lambda value: all(str(path).endswith(".npz") for path in value)
     )
