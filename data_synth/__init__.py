@@ -5,19 +5,24 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 
 from data_synth.balls import BallPlate, ball_plate
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
+from data_synth.crumples import N_CRUMPLES, drawn_crumple, shipped_crumple
 from data_synth.folds import View, crumpled
 from data_synth.lettering import glyph, pseudo_words
 from data_synth.lights import Format, Light, standard_lights
 from data_synth.manuscript import Layer, Lettered, Manuscript, hidden_manuscript
 from data_synth.pages import Blank, Checkerboard, Page, board_page
 from data_synth.patterns import default_fringes
+from data_synth.refinement import refined
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
+from data_synth.texts import N_LETTERS, Text, page_words
 from data_synth.truth import Truth
 
 __all__ = [
     "BOARD",
+    "N_CRUMPLES",
+    "N_LETTERS",
     "PAGE_SIZE_MM",
     "BallPlate",
     "Blank",
@@ -31,6 +36,7 @@ __all__ = [
     "Page",
     "Rig",
     "RigConfig",
+    "Text",
     "TrueSheet",
     "Truth",
     "View",
@@ -41,15 +47,19 @@ __all__ = [
     "default_fringes",
     "default_rig",
     "dome",
+    "drawn_crumple",
     "flat_sheet",
     "glyph",
     "hidden_manuscript",
+    "page_words",
     "photograph",
     "plane",
     "posed",
     "pseudo_words",
+    "refined",
     "render",
     "render_board",
+    "shipped_crumple",
     "standard_lights",
     "tent",
 ]

@@ -86,11 +86,18 @@ class TrialsAt(Checked):
 
 @dataclass
 class SheetSettings(Checked):
-    """The crumpled sheet."""
+    """The crumpled sheet.
+
+    `kind`: mirror folds, drawn from the trial's seed; or physical crumples, of which eight are shipped.
+    `drawn`: new physical sheets from the trial's seed instead of the shipped ones; some 20 s each.
+    `slope_p90_deg`: of drawn sheets; the shipped ones have their own.
+    `paths`: sheets with V (h, w, 3) and F (h, w, 2) in mm, used instead.
+    """
 
     group: ClassVar[str] = "sheet."
-    kind: str = choice("mirror", "mirror")
-    slope_p90_deg: float = number(20.0, 1.0, 35.0, "degrees")
+    kind: str = choice("mirror", "mirror", "physical")
+    drawn: bool = False
+    slope_p90_deg: float = number(20.0, 1.0, 45.0, "degrees")
     paths: list[str] = setting(
         [], "be a list of NPZ files, one a trial", lambda value: all(str(path).endswith(".npz") for path in value)
     )
@@ -98,10 +105,15 @@ class SheetSettings(Checked):
 
 @dataclass
 class PageSettings(Checked):
-    """What is printed on the sheet."""
+    """What is printed on the sheet.
+
+    `text`: of a lettered page in the experiment `ocr_misses`, always 176 letters: pseudo-words of the 22 capitals that
+    readers tell apart best, of all 26, or plain English in lower case.
+    """
 
     group: ClassVar[str] = "page."
     kind: str = choice("checkerboard", "checkerboard", "lettered")
+    text: str = choice("capitals", "capitals", "full", "prose")
 
 
 @dataclass
@@ -202,6 +214,28 @@ class RealBoardsSettings(Checked):
 
 
 @dataclass
+class ReadingSettings(Checked):
+    """How pages are read, and which.
+
+    `engine`: never replaced by the other one. `psm`: page segmentation mode; 6 is one block of text.
+    `severities`: further 90th percentiles of slope at which pages are read.
+    `restore`: false reads unrestored pages alone and scans none, which is how a severity is chosen.
+    `real_path`: folder of photographed documents with their words; they are not part of the project.
+    """
+
+    group: ClassVar[str] = "ocr."
+    engine: str = choice("tesserocr", "tesserocr", "pytesseract")
+    psm: int = count(6, 3, 13)
+    severities: list[float] = setting(
+        [],
+        "be a list of different numbers in [1, 45] degrees",
+        lambda values: len(set(values)) == len(values) and all(1.0 <= value <= 45.0 for value in values),
+    )
+    restore: bool = True
+    real_path: str | None = None
+
+
+@dataclass
 class SurfacesSettings(Checked):
     """The flattening of meshes that store their flat sheet.
 
@@ -296,6 +330,7 @@ class Config(Checked):
     integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
+    ocr: ReadingSettings = field(default_factory=ReadingSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
     surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
 

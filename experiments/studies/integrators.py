@@ -95,8 +95,8 @@ class Integrators(Study):
             Section("Energy", "Largest change in an undamped flight.", ("energy/",), ("energy_drift",)),
             Section(
                 "Flattening",
-                "Crumpled pages of 45 x 45 vertices to rest, each integrator at .9 of its longest stable step (implicit "
-                "Euler: at 4). `error` is the mean distance to the static solution of the same springs; the "
+                "Crumpled pages of 45 x 45 vertices to rest, each integrator at .9 of its longest stable step, implicit "
+                "Euler at 4. `error` is the mean distance to the static solution of the same springs; the "
                 "error of the chords themselves, under `-`, dwarfs it. `to the residual`: evaluations until the page "
                 "lies flat with an energy within 1 % of the least.",
                 ("flattening/",),
