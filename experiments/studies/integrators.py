@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from deskew import flattening
 from deskew.errors import require
-from experiments.reporting import Column, Layout, Section, Times
+from experiments.reporting import Column, Diagram, Layout, Panel, Section, Shares, Times
 from experiments.settings import Config
 from experiments.studies import courses, integrator_tests
 from experiments.studies.study import Study
@@ -15,6 +15,9 @@ from experiments.trials import Outcome, Recorder, TrialKey
 # Of the sheets in the map of outcomes so many are also timed, thrown and let bounce.
 _N_FLOWN, _N_FLATTENED = 3, 5
 _DEFAULT_DAMPING = 0.8
+_EQUAL = (("free_flight/dt=", ""),)
+_FLOWN = (*_EQUAL, ("free_flight/tolerance=", ", its own steps"))
+_FLOOR = (("reference", "free_flight", "reference_floor_mm"),)
 
 
 class Integrators(Study):
@@ -59,6 +62,7 @@ class Integrators(Study):
             Column("stable_dt_theory", "theory [2/omega]", 3),
             Column("stable_dt_ratio", "measured / theory", 3),
             Column("stable_dt_s", "longest stable step [s]", 6),
+            Column("stable_dt_theory_s", "theory [s]", 6),
             Column("unlimited", "unlimited", share=True),
             Column("at_rest", "at rest", share=True),
             Column("steps", "steps", 0),
@@ -90,13 +94,13 @@ class Integrators(Study):
                 "Longest stable step",
                 "By bisection, and by linear theory from the integrator's own table.",
                 ("stability/",),
-                ("stable_dt", "stable_dt_theory", "stable_dt_ratio", "stable_dt_s", "unlimited"),
+                ("stable_dt", "stable_dt_theory", "stable_dt_ratio", "stable_dt_s", "stable_dt_theory_s", "unlimited"),
             ),
             Section("Energy", "Largest change in an undamped flight.", ("energy/",), ("energy_drift",)),
             Section(
                 "Flattening",
-                "Crumpled pages of 45 x 45 vertices to rest, each integrator at .9 of its longest stable step, implicit "
-                "Euler at 4. `error` is the mean distance to the static solution of the same springs; the "
+                "Crumpled pages of 45 x 45 vertices to rest, each integrator at .9 of its longest stable step, "
+                "implicit Euler at 4. `error` is the mean distance to the static solution of the same springs; the "
                 "error of the chords themselves, under `-`, dwarfs it. `to the residual`: evaluations until the page "
                 "lies flat with an energy within 1 % of the least.",
                 ("flattening/",),
@@ -116,7 +120,7 @@ class Integrators(Study):
             Section(
                 "Stiffer springs under the same weight",
                 "The paper: it is easy to make k_s too high, and Euler must then take smaller steps.",
-                ("contact/ks",),
+                ("contact/ks=",),
                 ("at_rest", "steps", "force_evaluations", "evaluations_to_residual", "error_mm"),
             ),
             Section(
@@ -134,6 +138,74 @@ class Integrators(Study):
                     Column("seconds_flatten", "to rest [s]", 4),
                     Column("seconds_to_residual", "to the residual [s]", 4),
                 ),
+            ),
+        ),
+        diagrams=(
+            Diagram(
+                "work_precision",
+                "A thrown sheet in free flight: error against what it costs; dotted: the reference's own error",
+                (
+                    Panel(_EQUAL, "", "error_mm", "step [2 / omega]", "error [mm]", levels=_FLOOR),
+                    Panel(_FLOWN, "force_evaluations", "error_mm", "force evaluations", "error [mm]", levels=_FLOOR),
+                    Panel(_FLOWN, "seconds_fly", "error_mm", "seconds", "error [mm]", levels=_FLOOR),
+                ),
+            ),
+            Diagram(
+                "stable_steps",
+                "Longest stable step: measured (markers) and by linear theory (broken)",
+                (
+                    Panel(
+                        (("stability/zeta=", ""),),
+                        "",
+                        "stable_dt",
+                        "damping ratio of the stiffest mode",
+                        "step [2 / omega]",
+                        theory="stable_dt_theory",
+                        linear=True,
+                    ),
+                    Panel(
+                        (("stability/ks=", ""),),
+                        "",
+                        "stable_dt_s",
+                        "k_s [kg/s^2]",
+                        "step [s]",
+                        theory="stable_dt_theory_s",
+                    ),
+                ),
+            ),
+            Diagram(
+                "flattening",
+                "Crumpled pages to the same residual, and how far from the static solution they end; "
+                "dotted: error of the chords themselves",
+                (
+                    Panel(
+                        (("flattening/", ""),),
+                        "",
+                        "evaluations_to_residual",
+                        "damping ratio",
+                        "force evaluations to the residual",
+                    ),
+                    Panel(
+                        (("flattening/", ""),), "", "seconds_to_residual", "damping ratio", "seconds to the residual"
+                    ),
+                    Panel(
+                        (("flattening/", ""),),
+                        "seconds_flatten",
+                        "error_mm",
+                        "seconds to rest",
+                        "distance to the static solution [mm]",
+                        levels=(("chords", "flattening/zeta=0.8", "discretisation_mm"),),
+                    ),
+                ),
+            ),
+        ),
+        shares=(
+            Shares(
+                "outcomes",
+                "How crumpled pages of 15 to 40 degrees end, by the strength of the push",
+                "push: m g / (k r)",
+                "outcomes/push=",
+                (("flat", "tab:green"), ("locked", "tab:orange"), ("folded", "tab:red"), ("diverged", "black")),
             ),
         ),
     )
