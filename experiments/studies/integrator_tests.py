@@ -10,6 +10,7 @@ from statistics import median
 import numpy as np
 
 from deskew import flattening
+from deskew.errors import StepError
 from deskew.flattening.integrators import EVALUATIONS, REJECTED, STEPS, Run
 from deskew.flattening.schemes import Scheme
 from deskew.flattening.stability import largest_stable_step
@@ -38,7 +39,7 @@ FLIGHT_DAMPING = 0.5
 TOLERANCES_MM = tuple(10.0**-k for k in range(0, 9))
 BOUNCE_STEPS = (200, 400, 800, 1600, 3200)
 DRIFT_STEPS = (0.4, 0.2, 0.1)
-_N_TIMED = 3
+_N_TIMED, _N_FITTED = 3, 4
 _DRIFT_UNITS, _EXPLODED = 400.0, 1000.0
 # An error this far above the reference's own is the integrator's; one above this share of the way is of no small step.
 _ABOVE_FLOOR, _SMALL = 100.0, 1e-2
@@ -67,7 +68,9 @@ def measure_free_flight(record: Recorder, rng: np.random.Generator, methods: Seq
                     fits.append((step, error))
             if isinstance(integrator, Scheme) and integrator.estimate:
                 _fly_adaptively(record, method, flight, integrator, exact)
-            order = fitted_order(*zip(*fits[-5:], strict=True))
+            if len(fits) < _N_FITTED:
+                raise StepError(f"No order: only {len(fits)} steps gave small errors above the reference's floor.")
+            order = fitted_order(*zip(*fits[-_N_FITTED:], strict=True))
             record.add("free_flight", method, {"order": order} | _theory(integrator))
 
 
