@@ -6,6 +6,7 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 from data_synth.balls import BallPlate, ball_plate
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
+from data_synth.kontron import KONTRON_SIZE, PAL_SIZE, kontron_light, kontron_readout, manuscript_rig
 from data_synth.leaf import Leaf
 from data_synth.lettering import glyph, pseudo_words
 from data_synth.lights import Format, Light, standard_lights
@@ -27,8 +28,10 @@ from data_synth.truth import Truth
 
 __all__ = [
     "BOARD",
+    "KONTRON_SIZE",
     "N_SHIPPED",
     "PAGE_SIZE_MM",
+    "PAL_SIZE",
     "BallPlate",
     "Blank",
     "BoardPose",
@@ -58,6 +61,9 @@ __all__ = [
     "flat_sheet",
     "glyph",
     "hidden_manuscript",
+    "kontron_light",
+    "kontron_readout",
+    "manuscript_rig",
     "photograph",
     "plane",
     "posed",
