@@ -25,6 +25,7 @@ from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
 from data_synth.truth import Truth
+from data_synth.vellum import VellumPage
 
 __all__ = [
     "BOARD",
@@ -49,6 +50,7 @@ __all__ = [
     "TrueSheet",
     "Truth",
     "TwoMaterials",
+    "VellumPage",
     "View",
     "ball_plate",
     "board_page",
