@@ -24,6 +24,7 @@ from data_synth.patterns import default_fringes
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
+from data_synth.splines import refined
 from data_synth.truth import Truth
 from data_synth.vellum import VellumPage
 
@@ -71,6 +72,7 @@ __all__ = [
     "posed",
     "pseudo_words",
     "read_two_materials",
+    "refined",
     "render",
     "render_board",
     "shipped_two_materials",
