@@ -119,7 +119,7 @@ def write_two_materials(two: TwoMaterials, path: Path) -> None:
     StepError
         If the file system refuses.
     """
-    # Digits that mean nothing would take a fifth of the file; plane by plane, as Fortran stores it, F takes next to none.
+    # Digits that mean nothing would take a fifth of the file; plane by plane, in Fortran's order, F takes next to none.
     vertices = np.round(two.sheet.vertices / _STEP_MM) * _STEP_MM
     V, F = (np.asfortranarray(grid, np.float32) for grid in (vertices, two.sheet.flat))
     leaf, change = np.array([two.leaf.share, two.leaf.corner_mm]), np.array(two.change_percent)
