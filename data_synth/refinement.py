@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 from data_synth.sheets import SPACING_MM, TrueSheet
+from data_synth.splines import resampled
 from deskew.types import Floats
 
 _FINE_ENOUGH = 1.5  # times the wanted spacing
@@ -35,14 +35,20 @@ def refined(sheet: TrueSheet, spacing_mm: float = SPACING_MM, *, chords: bool = 
     TrueSheet
         The sheet itself where it is as fine already.
     """
-    samples = []
-    for axis, extent in zip((0, 1), sheet.page_size_mm[::-1], strict=True):
-        n, wanted = sheet.vertices.shape[axis], round(extent / spacing_mm) + 1
-        samples.append(np.linspace(0.0, n - 1.0, wanted if wanted > _FINE_ENOUGH * (n - 1) else n))
-    if tuple(map(len, samples)) == sheet.vertices.shape[:2]:
+    shape = _finer(sheet, spacing_mm)
+    if shape == sheet.vertices.shape[:2]:
         return sheet
     V = _eased(sheet.vertices) if chords else sheet.vertices
-    return TrueSheet(_resampled(V, samples), _resampled(sheet.flat, samples))
+    return TrueSheet(resampled(V, shape), resampled(sheet.flat, shape))
+
+
+def _finer(sheet: TrueSheet, spacing_mm: float) -> tuple[int, int]:
+    """Rows and columns of the finer grid; as many as there are along an axis that is fine enough."""
+    rows, columns = (
+        n if (wanted := round(extent / spacing_mm) + 1) <= _FINE_ENOUGH * (n - 1) else wanted
+        for n, extent in zip(sheet.vertices.shape[:2], sheet.page_size_mm[::-1], strict=True)
+    )
+    return rows, columns
 
 
 def _eased(V: Floats) -> Floats:
@@ -51,11 +57,3 @@ def _eased(V: Floats) -> Floats:
     eased[1:-1] += np.diff(V, 2, axis=0) / 24
     eased[:, 1:-1] += np.diff(V, 2, axis=1) / 24
     return eased
-
-
-def _resampled(grid: Floats, samples: list[Floats]) -> Floats:
-    """Sample a grid (h, w, d) at fractional rows and columns."""
-    rows, columns = (np.arange(n, dtype=np.float64) for n in grid.shape[:2])
-    degrees = {"kx": min(3, len(rows) - 1), "ky": min(3, len(columns) - 1)}
-    splines = [RectBivariateSpline(rows, columns, grid[..., c], s=0, **degrees) for c in range(grid.shape[2])]
-    return np.stack([spline(*samples) for spline in splines], axis=-1)
