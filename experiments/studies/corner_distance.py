@@ -14,20 +14,21 @@ from deskew import acquisition, metrics, pipeline, restoration
 from deskew.errors import require
 from deskew.recipes import Recipe
 from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan
-from experiments.reporting import Column, Layout, Montage, Plot
+from experiments.reporting import Column, FigurePage, Layout, Numbers, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
-from experiments.studies.given_sheets import read_sheet
 from experiments.studies.methods import require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.recipes import calibration_mode, methods_by_recipe
 from experiments.studies.study import Study
+from experiments.studies.trial_sheets import require_sheets, severity, sheet_inputs, trial_sheet
 from experiments.studies.views import DETECTORS, restored_corners, seen_corners
 from experiments.trials import Outcome, Recorder, TrialKey, reason_of
 
 _PAPER_PX, _PAPER_MM = 0.5, 0.25
-_N_SHOWN = 5
+# The reports are committed: as many pages as the paper shows, or every crumple that is shipped.
+_N_SHOWN = {"mirror": 5, "physical": data_synth.N_CRUMPLES}
 
 
 class CornerDistance(Study):
@@ -72,8 +73,8 @@ class CornerDistance(Study):
             Column("corners_expected", "expected", 0),
             Column("at_rest", "at rest", headline=True, share=True),
             Column("folded_quads", "folded quads", 0),
-            Column("slope_p90_deg", "p90 slope [deg]", 1),
-            Column("relief_mm", "relief [mm]", 1),
+            Column("slope_p90_deg", "p90 slope [deg]", 1, headline=True),
+            Column("relief_mm", "relief [mm]", 1, headline=True),
             Column("depth_raw_rms_mm", "depth RMS [mm]", 3),
             Column("depth_rms_mm", "filtered depth RMS [mm]", 3),
             Column("depth_coverage", "depth coverage", 4),
@@ -85,14 +86,23 @@ class CornerDistance(Study):
             Plot("corner_mean_mm", "corner_mean_mm", "mean corner distance, affine-aligned [mm]", _PAPER_MM),
             Plot("dense_mean_mm", "dense_mean_mm", "mean distance of all restored pixels, rigidly aligned [mm]"),
         ),
-        (
-            Montage(
-                "pages",
+        pages=(
+            FigurePage(
+                "figure_3",
+                "Experiment I: crumpled pages, restored, and their control (the paper's figure 3)",
+                "Row I: the crumpled pages as the camera sees them. Row II: the recovered 3D models, heights three "
+                "times too large. Row III: the restored pages, their shading left in. Row IV: the control, the page "
+                "photographed flat, and how far the corners of the pictures above are from the control's in the mean, "
+                "after an affine alignment, in the image and on the page.",
                 (
-                    ("crumpled", "page_{trial}_crumpled"),
-                    ("3D model", "page_{trial}_model"),
-                    ("restored", "page_{trial}_restored"),
-                    ("control", "page_{trial}_control"),
+                    ("captured", "page_{column}_crumpled"),
+                    ("3D model", "page_{column}_model"),
+                    ("restored", "page_{column}_restored_{method}"),
+                ),
+                control=("control", "page_{column}_control"),
+                numbers=Numbers(
+                    (("unrestored", "unrestored"), ("restored", "restored")),
+                    ("slope_p90_deg", "relief_mm", "corner_mean_px", "corner_mean_mm"),
                 ),
             ),
         ),
@@ -102,15 +112,12 @@ class CornerDistance(Study):
         """Plan one trial a sheet."""
         require_methods(config)
         require(config.page.kind == "checkerboard", "page.kind", "be checkerboard, for its corners", config.page.kind)
-        n = len(config.sheet.paths)
-        require(n == 0 or config.trials <= n, "trials", f"be at most {n}, one a file of sheet.paths", config.trials)
-        for path in config.sheet.paths[: config.trials]:
-            read_sheet(Path(path), Checkerboard().page_size_mm)
+        require_sheets(config)
         return Study.plan(self, config)
 
     def inputs(self, config: Config) -> dict[str, Path]:
         """Name the given sheets."""
-        return {f"sheet.paths[{i}]": Path(path) for i, path in enumerate(config.sheet.paths)}
+        return sheet_inputs(config)
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials."""
@@ -121,10 +128,10 @@ class CornerDistance(Study):
         bench: Bench = shared
         record, rng, page = Recorder(key), key.generator(), Checkerboard()
         with record.stage("render"):
-            sheet = _sheet(config, key, rng)
+            sheet = trial_sheet(config, key, rng)
             flat, flat_truth = data_synth.render(bench.rig, data_synth.flat_sheet(page.page_size_mm), page, rng)
             capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-        trial = _Trial(record, bench, page, truth)
+        trial = _Trial(record, bench, page, truth, pictured=key.trial < _N_SHOWN[config.sheet.kind])
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)
         recipes = methods_by_recipe(config)
@@ -146,8 +153,8 @@ class _Trial:
     cannot be scanned or restored is a failed row of each, not a missing one.
     """
 
-    def __init__(self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth) -> None:
-        self.record, self.bench, self.page, self.truth = record, bench, page, truth
+    def __init__(self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth, *, pictured: bool) -> None:
+        self.record, self.bench, self.page, self.truth, self.pictured = record, bench, page, truth, pictured
         self.camera = bench.calibration.camera
         self.view: Pinhole = restoration.view_camera(self.camera)
         self.corners_mm: Floats = page.corners.reshape(-1, 2)
@@ -169,8 +176,7 @@ class _Trial:
         """Measure the crumpled page as it is, with its sheet and the calibration."""
         image = restoration.undistorted_view(capture.white, self.camera)
         self._compare("unrestored", "-", image, seen_corners(self.truth, self.corners_mm, self.camera, self.view))
-        shape = {"slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm}
-        self.record.add("unrestored", "-", self.bench.residuals() | shape)
+        self.record.add("unrestored", "-", self.bench.residuals() | severity(sheet))
         self._picture("crumpled", image)
 
     def scanned(
@@ -221,7 +227,7 @@ class _Trial:
         self.record.add("restored", method, figures)
         self._compare("restored", method, restored.image, restored_corners(uv, self.corners_mm))
         if shown:
-            self._picture("restored", restored.image)
+            self._picture(f"restored_{method}", restored.image)
 
     def _compare(self, condition: str, method: str, image: Array, seeds: Floats) -> None:
         for name, detect in DETECTORS.items():
@@ -236,12 +242,5 @@ class _Trial:
             self.record.fail(f"{condition}{name}", method, reason_of(error))
 
     def _picture(self, name: str, image: Array) -> None:
-        # As many pages as the paper shows: the reports are committed.
-        if self.record.key.trial < _N_SHOWN:
+        if self.pictured:
             self.record.picture(f"page_{self.record.key.trial}_{name}", image)
-
-
-def _sheet(config: Config, key: TrialKey, rng: np.random.Generator) -> TrueSheet:
-    if not config.sheet.paths:
-        return data_synth.crumpled(rng, slope_p90_deg=config.sheet.slope_p90_deg)
-    return read_sheet(Path(config.sheet.paths[key.trial]), Checkerboard().page_size_mm)

@@ -104,6 +104,17 @@ def test_every_study_documents_its_conditions(name: str) -> None:
         (["experiment=corner_distance", "sheet.paths=[a.npz]", "trials=2"], ("`trials`", "at most 1", "got 2")),
         (["experiment=corner_distance", "sheet.paths=[no.npz]", "trials=1"], ("no.npz",)),
         (["experiment=corner_distance", "sheet.slope_p90_deg=50"], ("`sheet.slope_p90_deg`", "[1, 35]", "50")),
+        (["experiment=corner_distance", "sheet.kind=crumpled"], ("`sheet.kind`", "mirror, physical", "crumpled")),
+        (
+            ["experiment=corner_distance", "sheet.paths=[a.npz]", "trials=1", "sheet.drawn=true"],
+            ("`sheet.drawn`", "false"),
+        ),
+        (
+            ["experiment=decoders", "sheet.kind=physical", "sheet.drawn=true", "sheet.slope_p90_deg=33"],
+            ("`sheet.slope_p90_deg`", "[3, 30] degrees", "33"),
+        ),
+        (["experiment=plane_accuracy", "sheet=physical"], ("`sheet.kind`", "left out: this", "physical")),
+        (["experiment=surfaces", "sheet.drawn=true"], ("`sheet.drawn`", "left out", "True")),
         (["experiment=plane_accuracy", "method=nope"], ("method", "nope")),
         (["experiment=plane_accuracy", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
         (["experiment=ablations", "method=nope"], ("method", "nope")),
