@@ -3,9 +3,9 @@
 The command :mod:`data_synth.crumpling` drew shipped sheet i by :func:`data_synth.physical.physical` from
 ``numpy.random.default_rng(i)``, for a slope of ``SLOPES_P90_DEG[i]``; seeds and slopes were fixed before any was seen.
 
-A file holds the world positions of a grid that is regular on the letter page: as whole multiples of 2^-14 mm, of which
-`steps` (h, w, 3) are the differences along v and then u, since these pack into a third of what positions take; and what
-:func:`data_synth.surfaces.severity` says of the sheet.
+A file holds the world positions V (h, w, 3) and the page coordinates F (h, w, 2) of a grid [mm], as every file of a
+sheet does, and what :func:`data_synth.surfaces.severity` says of it. Positions are whole multiples of 2^-14 mm, which
+pack well.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from data_synth.physical import physical
 from data_synth.refinement import refined
-from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, page_grid_of
+from data_synth.sheets import TrueSheet
 from data_synth.surfaces import severity
 from deskew.errors import require_whole
 from deskew.io import read_arrays, write_arrays
@@ -80,16 +80,14 @@ def read_crumple(path: Path) -> TrueSheet:
         If there is no such file, or another one.
     """
     arrays = read_arrays(path)
-    require_arrays(arrays, {"steps": (None, None, 3)}, path)
-    V = arrays["steps"].cumsum(axis=1, dtype=np.int64).cumsum(axis=0) * _STEP_MM
-    return TrueSheet(V, page_grid_of((V.shape[0], V.shape[1]), PAGE_SIZE_MM))
+    require_arrays(arrays, {"V": (None, None, 3), "F": (None, None, 2)}, path)
+    return TrueSheet(arrays["V"], arrays["F"])
 
 
 def write_crumple(sheet: TrueSheet, path: Path) -> None:
     """Write a sheet on a regular grid of the letter page, with its severity; the same sheet gives the same bytes."""
-    whole = np.round(sheet.vertices / _STEP_MM).astype(np.int32)
-    steps = np.diff(np.diff(whole, axis=0, prepend=0), axis=1, prepend=0)
-    told = asdict(severity(TrueSheet(whole * _STEP_MM, sheet.flat)))
+    V = np.round(sheet.vertices / _STEP_MM) * _STEP_MM
+    told = asdict(severity(TrueSheet(V, sheet.flat)))
     # Coordinate by coordinate, which is Fortran's order, they compress better.
-    arrays = {"steps": np.asfortranarray(steps), **{name: np.asarray(value) for name, value in told.items()}}
-    write_arrays(arrays, path)
+    places = {name: np.asfortranarray(grid, dtype=np.float32) for name, grid in (("V", V), ("F", sheet.flat))}
+    write_arrays({**places, **{name: np.asarray(value) for name, value in told.items()}}, path)
