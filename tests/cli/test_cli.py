@@ -93,8 +93,10 @@ class StandIn:
         self._step("stiffness", materials=materials)
         return scan
 
-    def restore_lights(self, scan: Scan, *, method: str, lights: Sequence[str], scale: float) -> Textures:
-        self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale)
+    def restore_lights(
+        self, scan: Scan, *, method: str, lights: Sequence[str], scale: float, **settings: object
+    ) -> Textures:
+        self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale, settings=settings)
         remedy = "" if self.status is Status.AT_REST else "push harder"
         flattened = Flattened(
             scan.sheet.vertices, self.status, remedy, {"steps": 7, "spring_energy": np.float64("nan")}
@@ -220,6 +222,23 @@ def test_a_stiffness_map_is_taken_when_asked_for(
     steps.calls.clear()
     code, out, err = run(f"{start} -o out/t.png --stiffness dark.png", capsys)
     assert (code, out, err) == (2, "", "deskew: `dark.toml` must be a file, got nothing there.\n")
+    assert not steps.calls
+
+
+@pytest.mark.parametrize("start", ["run page -c c.json", "restore scan.npz"])
+def test_a_free_scale_is_the_methods_setting_and_needs_a_map(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], start: str
+) -> None:
+    (here / "mask.toml").write_text("[stiffness]\n255 = 3.5\n")
+    assert run(f"{start} -o out/r.png --stiffness mask.png", capsys)[0] == 0
+    assert steps.calls["restore"]["settings"] == {}
+    assert run(f"{start} -o out/r.png --stiffness mask.png --free-scale", capsys)[0] == 0
+    assert steps.calls["restore"]["settings"] == {"free_scale": True}
+    steps.calls.clear()
+    wanted = "deskew: `--free-scale` must come with --stiffness, a map of two materials, got none.\n"
+    assert run(f"{start} -o out/r.png --free-scale", capsys) == (2, "", wanted)
+    wanted = "deskew: `--free-scale` must be left out, since only the method spring finds a scale, got paper_rk4.\n"
+    assert run(f"{start} -o out/r.png -m paper_rk4 --stiffness mask.png --free-scale", capsys) == (2, "", wanted)
     assert not steps.calls
 
 
