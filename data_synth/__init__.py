@@ -6,9 +6,18 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 from data_synth.balls import BallPlate, ball_plate
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
+from data_synth.leaf import Leaf
 from data_synth.lettering import glyph, pseudo_words
 from data_synth.lights import Format, Light, standard_lights
 from data_synth.manuscript import Layer, Lettered, Manuscript, hidden_manuscript
+from data_synth.materials import (
+    N_SHIPPED,
+    Case,
+    TwoMaterials,
+    draw_two_materials,
+    read_two_materials,
+    shipped_two_materials,
+)
 from data_synth.pages import Blank, Checkerboard, Page, board_page
 from data_synth.patterns import default_fringes
 from data_synth.render import photograph, render
@@ -18,13 +27,16 @@ from data_synth.truth import Truth
 
 __all__ = [
     "BOARD",
+    "N_SHIPPED",
     "PAGE_SIZE_MM",
     "BallPlate",
     "Blank",
     "BoardPose",
+    "Case",
     "Checkerboard",
     "Format",
     "Layer",
+    "Leaf",
     "Lettered",
     "Light",
     "Manuscript",
@@ -33,6 +45,7 @@ __all__ = [
     "RigConfig",
     "TrueSheet",
     "Truth",
+    "TwoMaterials",
     "View",
     "ball_plate",
     "board_page",
@@ -41,6 +54,7 @@ __all__ = [
     "default_fringes",
     "default_rig",
     "dome",
+    "draw_two_materials",
     "flat_sheet",
     "glyph",
     "hidden_manuscript",
@@ -48,8 +62,10 @@ __all__ = [
     "plane",
     "posed",
     "pseudo_words",
+    "read_two_materials",
     "render",
     "render_board",
+    "shipped_two_materials",
     "standard_lights",
     "tent",
 ]

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from deskew.errors import StepError, require
+from experiments.reporting.figure_pages import figure_page, pictures_on
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.layout import Layout
 from experiments.reporting.tables import table, times_page
@@ -53,6 +54,11 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
         if wall is not None:
             files[f"figures/{montage.name}.png"] = png_bytes(wall)
         shown |= {name.format(trial=row.trial) for _, name in montage.lines for row in results.rows}
+    for page in layout.pages:
+        png = figure_page(page, layout.columns, results.rows, results.pictures)
+        if png is not None:
+            files[f"figures/{page.name}.png"] = png
+        shown |= pictures_on(page, results.rows)
     alone = {name: png for name, png in results.pictures.items() if name not in shown}
     files |= {f"figures/{name}.png": png for name, png in alone.items()}
     _replace_all(out, files)
@@ -60,7 +66,8 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
 
 def require_targets(out: Path, layout: Layout) -> None:
     """Raise an InputError where a report could not be written under `out`: to be asked before the trials."""
-    drawn = [*(plot.name for plot in layout.plots), *(montage.name for montage in layout.montages)]
+    figures = (layout.plots, layout.montages, layout.pages)
+    drawn = [item.name for kind in figures for item in kind]
     names = [
         "results.csv",
         "timings.csv",

@@ -63,7 +63,7 @@ class Plot:
 
 @dataclass(frozen=True, slots=True)
 class Montage:
-    """A figure of pictures: a column a trial, a line a kind of picture, as in the paper's figure 3.
+    """A figure of pictures: a column a trial, a line a kind of picture.
 
     Attributes
     ----------
@@ -81,6 +81,63 @@ class Montage:
     lines: tuple[tuple[str, str], ...]
     item: str = "page"
     caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """The table on a figure page: a line for each of its columns of pictures, then the mean and the paper's figures.
+
+    Across, each condition stands once for every method that has rows; under it its metrics, named and rounded as the
+    layout's columns. What has no rows has no place.
+
+    Attributes
+    ----------
+    conditions : tuple of (heading, condition)
+        Left to right. "{column}" in a condition stands for the line's column, as in `FigurePage.lines`.
+    metrics : tuple of str
+        The metrics of each condition, left to right; each must be a column of the layout.
+    """
+
+    conditions: tuple[tuple[str, str], ...]
+    metrics: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FigurePage:
+    """A printed page of pictures and their numbers, like the paper's figures 3, 4 and 5.
+
+    Lines of pictures under Roman numerals, then the control beside the table of numbers, then the caption. Pictures
+    are those that trials record (`Recorder.picture`).
+
+    Attributes
+    ----------
+    name : str
+        Written as `figures/NAME.png`: as wide as the text of an A4 page, at most as tall, below 2 MB.
+    title, caption : str
+        Heading, and what is printed under the page.
+    lines : tuple of (heading, picture)
+        One kind of picture each. In the picture's name "{column}" stands for the column; "{method}" for a method: the
+        line is drawn once for each that has pictures, which the heading names.
+    columns : tuple of (heading, column)
+        What stands side by side, from left to right: cases, for example. Empty for a column a trial, by its number
+        from 0, eight at most; more than five are drawn in two blocks.
+    item : str
+        What a column of a trial is called: "page 1", ...
+    control : (heading, picture) or None
+        Drawn once, larger; "{column}" stands for the first column that has one.
+    numbers : Numbers or None
+        With a column a trial its lines are that trial's figures and their mean over all trials, the shown ones or not;
+        with `columns` each line is the mean over the trials, and nothing is pooled across lines.
+    """
+
+    name: str
+    title: str
+    caption: str
+    lines: tuple[tuple[str, str], ...]
+    columns: tuple[tuple[str, str], ...] = ()
+    item: str = "page"
+    control: tuple[str, str] | None = None
+    numbers: Numbers | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,13 +193,15 @@ class Layout:
     plots : tuple of Plot
         The figures.
     montages : tuple of Montage
-        Figures of pictures; a picture in one of them is not written by itself.
+        Figures of pictures; a picture in one of them, or on a page, is not written by itself.
     sections : tuple of Section
         Parts of the summary, instead of one table of all conditions by the headline metrics.
     times : tuple of Times
         Tables of times that head `table.md`.
     profile : Times or None
         Of a study of speed: what is written as `profile.md`.
+    pages : tuple of FigurePage
+        Printed pages of pictures and numbers.
     """
 
     title: str
@@ -153,3 +212,4 @@ class Layout:
     sections: tuple[Section, ...] = ()
     times: tuple[Times, ...] = ()
     profile: Times | None = None
+    pages: tuple[FigurePage, ...] = ()

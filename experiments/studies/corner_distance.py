@@ -14,7 +14,7 @@ from deskew import acquisition, metrics, pipeline, restoration
 from deskew.errors import require
 from deskew.recipes import Recipe
 from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Scan
-from experiments.reporting import Column, Layout, Montage, Plot
+from experiments.reporting import Column, FigurePage, Layout, Numbers, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
@@ -85,14 +85,23 @@ class CornerDistance(Study):
             Plot("corner_mean_mm", "corner_mean_mm", "mean corner distance, affine-aligned [mm]", _PAPER_MM),
             Plot("dense_mean_mm", "dense_mean_mm", "mean distance of all restored pixels, rigidly aligned [mm]"),
         ),
-        (
-            Montage(
-                "pages",
+        pages=(
+            FigurePage(
+                "figure_3",
+                "Experiment I: crumpled pages, restored, and their control (the paper's figure 3)",
+                "Row I: the crumpled pages as the camera sees them. Row II: the recovered 3D models, heights three "
+                "times too large. Row III: the restored pages, their shading left in. Row IV: the control, the page "
+                "photographed flat, and how far the corners of the pictures above are from the control's in the mean, "
+                "after an affine alignment, in the image and on the page.",
                 (
-                    ("crumpled", "page_{trial}_crumpled"),
-                    ("3D model", "page_{trial}_model"),
-                    ("restored", "page_{trial}_restored"),
-                    ("control", "page_{trial}_control"),
+                    ("captured", "page_{column}_crumpled"),
+                    ("3D model", "page_{column}_model"),
+                    ("restored", "page_{column}_restored_{method}"),
+                ),
+                control=("control", "page_{column}_control"),
+                numbers=Numbers(
+                    (("unrestored", "unrestored"), ("restored", "restored")),
+                    ("slope_p90_deg", "corner_mean_px", "corner_mean_mm"),
                 ),
             ),
         ),
@@ -221,7 +230,7 @@ class _Trial:
         self.record.add("restored", method, figures)
         self._compare("restored", method, restored.image, restored_corners(uv, self.corners_mm))
         if shown:
-            self._picture("restored", restored.image)
+            self._picture(f"restored_{method}", restored.image)
 
     def _compare(self, condition: str, method: str, image: Array, seeds: Floats) -> None:
         for name, detect in DETECTORS.items():

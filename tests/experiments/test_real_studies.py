@@ -63,7 +63,7 @@ def test_corner_distance_measures_every_condition_by_both_detectors(tmp_path: Pa
     assert rows["restored", "spring"]["dense_mean_mm"] < 0.7 * rows["restored", "paper_rk4"]["dense_mean_mm"]
     assert 0.003 < rows["control/saddle", "-"]["detector_rms_px"] < 0.05
     assert rows["restored", "paper_euler"]["corner_mean_px"] < rows["unrestored", "-"]["corner_mean_px"]
-    assert (tmp_path / "out" / "figures" / "pages.png").is_file()
+    assert (tmp_path / "out" / "figures" / "figure_3.png").is_file()
 
 
 def test_accuracy_measures_every_body_and_looks_through_every_fault(tmp_path: Path) -> None:
