@@ -6,6 +6,7 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 from data_synth.balls import BallPlate, ball_plate
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
 from data_synth.folds import View, crumpled
+from data_synth.kontron import KONTRON_SIZE, PAL_SIZE, kontron_light, kontron_readout, manuscript_rig
 from data_synth.leaf import Leaf
 from data_synth.lettering import glyph, pseudo_words
 from data_synth.lights import Format, Light, standard_lights
@@ -24,11 +25,14 @@ from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
 from data_synth.truth import Truth
+from data_synth.vellum import VellumPage
 
 __all__ = [
     "BOARD",
+    "KONTRON_SIZE",
     "N_SHIPPED",
     "PAGE_SIZE_MM",
+    "PAL_SIZE",
     "BallPlate",
     "Blank",
     "BoardPose",
@@ -46,6 +50,7 @@ __all__ = [
     "TrueSheet",
     "Truth",
     "TwoMaterials",
+    "VellumPage",
     "View",
     "ball_plate",
     "board_page",
@@ -58,6 +63,9 @@ __all__ = [
     "flat_sheet",
     "glyph",
     "hidden_manuscript",
+    "kontron_light",
+    "kontron_readout",
+    "manuscript_rig",
     "photograph",
     "plane",
     "posed",

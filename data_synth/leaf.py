@@ -27,7 +27,7 @@ class Leaf:
 
     page_size_mm: tuple[float, float] = PAGE_SIZE_MM
     share: float = 0.6
-    corner_mm: float = 8.0
+    corner_mm: float = 5.0
 
     def __post_init__(self) -> None:
         require(0.1 <= self.share <= 0.9, "share", "be in [0.1, 0.9]", self.share)
