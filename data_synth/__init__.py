@@ -5,6 +5,7 @@ It shares no mathematics with the reconstruction, so that a common error cannot 
 
 from data_synth.balls import BallPlate, ball_plate
 from data_synth.boards import BOARD, BoardPose, board_poses, render_board
+from data_synth.crumples import N_CRUMPLES, drawn_crumple, shipped_crumple
 from data_synth.folds import View, crumpled
 from data_synth.kontron import KONTRON_SIZE, PAL_SIZE, kontron_light, kontron_readout, manuscript_rig
 from data_synth.leaf import Leaf
@@ -21,15 +22,19 @@ from data_synth.materials import (
 )
 from data_synth.pages import Blank, Checkerboard, Page, board_page
 from data_synth.patterns import default_fringes
+from data_synth.refinement import refined
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
+from data_synth.texts import N_LETTERS, Text, page_words
 from data_synth.truth import Truth
 from data_synth.vellum import VellumPage
 
 __all__ = [
     "BOARD",
     "KONTRON_SIZE",
+    "N_CRUMPLES",
+    "N_LETTERS",
     "N_SHIPPED",
     "PAGE_SIZE_MM",
     "PAL_SIZE",
@@ -47,6 +52,7 @@ __all__ = [
     "Page",
     "Rig",
     "RigConfig",
+    "Text",
     "TrueSheet",
     "Truth",
     "TwoMaterials",
@@ -60,19 +66,23 @@ __all__ = [
     "default_rig",
     "dome",
     "draw_two_materials",
+    "drawn_crumple",
     "flat_sheet",
     "glyph",
     "hidden_manuscript",
     "kontron_light",
     "kontron_readout",
     "manuscript_rig",
+    "page_words",
     "photograph",
     "plane",
     "posed",
     "pseudo_words",
     "read_two_materials",
+    "refined",
     "render",
     "render_board",
+    "shipped_crumple",
     "shipped_two_materials",
     "standard_lights",
     "tent",

@@ -160,16 +160,25 @@ def write_surface(sheet: TrueSheet, path: Path, comments: Sequence[str] = ()) ->
     write_bytes(text.getvalue(), path)
 
 
-class _Parser(argparse.ArgumentParser):
+def made_folder(folder: Path) -> None:
+    """Make a folder unless it is there; raise an InputError where there is no place for one."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"`folder` must be a folder or a place for one, got {error.strerror or error}.") from error
+
+
+class CommandParser(argparse.ArgumentParser):
     """A parser that would print its usage and exit, made to complain in one line."""
 
     def error(self, message: str) -> NoReturn:
+        """Raise an InputError in the project's wording."""
         raise InputError(f"The arguments must be as --help shows, got: {message}.")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
-    parser = _Parser(prog="python -m data_synth.surfaces", description=(__doc__ or "").split("\n")[0])
+    parser = CommandParser(prog="python -m data_synth.surfaces", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path, help="made if it does not exist")
     parser.add_argument("--kind", default=",".join(KINDS), help="one or more, comma between [%(default)s]")
     parser.add_argument("--count", type=int, default=1, help="surfaces of each kind [%(default)s]")
@@ -194,10 +203,7 @@ def _write_all(options: argparse.Namespace) -> None:
     both = (options.rows is None) == (options.columns is None)
     require(both, "rows", "be given together with `columns`", "one of them")
     shape = None if options.rows is None else (options.rows, options.columns)
-    try:
-        options.folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"`folder` must be a folder or a place for one, got {error.strerror or error}.") from error
+    made_folder(options.folder)
     for kind in kinds:
         for seed in range(options.seed, options.seed + options.count):
             sheet = generate(kind, seed, shape, slope_p90_deg=options.slope_p90_deg)

@@ -181,6 +181,24 @@ def span(
     )
 
 
+def with_shading_removed(scan: Scan, capture: Capture, calibration: Calibration) -> Scan:
+    """Add the image `unshaded` to a scan: its white image without the projector's shading, which its shape tells.
+
+    Parameters
+    ----------
+    scan : Scan
+        The page.
+    capture : Capture
+        It was scanned from this one.
+    calibration : Calibration
+        Of the same devices; the place and direction of the projector count.
+    """
+    points = restoration.surface_points(scan.depth)
+    devices = calibration.camera, calibration.projector
+    unshaded = restoration.remove_shading(capture.white, capture.black, *devices, points)
+    return replace(scan, images={**scan.images, restoration.UNSHADED: unshaded})
+
+
 def with_stiffness(scan: Scan, materials: StiffnessMap) -> Scan:
     """Give each quad of a scanned sheet the spring constant of the material seen at its middle (section 4.3).
 

@@ -86,11 +86,18 @@ class TrialsAt(Checked):
 
 @dataclass
 class SheetSettings(Checked):
-    """The crumpled sheet."""
+    """The crumpled sheet.
+
+    `kind`: mirror folds, drawn from the trial's seed; or physical crumples, of which eight are shipped.
+    `drawn`: new physical sheets from the trial's seed instead of the shipped ones; some 20 s each.
+    `slope_p90_deg`: of drawn sheets; the shipped ones have their own.
+    `paths`: sheets with V (h, w, 3) and F (h, w, 2) in mm, used instead.
+    """
 
     group: ClassVar[str] = "sheet."
-    kind: str = choice("mirror", "mirror")
-    slope_p90_deg: float = number(20.0, 1.0, 35.0, "degrees")
+    kind: str = choice("mirror", "mirror", "physical")
+    drawn: bool = False
+    slope_p90_deg: float = number(20.0, 1.0, 45.0, "degrees")
     paths: list[str] = setting(
         [], "be a list of NPZ files, one a trial", lambda value: all(str(path).endswith(".npz") for path in value)
     )

@@ -127,7 +127,7 @@ def numbers_table(
             if with_paper:
                 cells.append(tuple(column.paper_figure(condition) or _NONE for column in measured))
             named = heading if method == "-" else f"{heading}\n{method}"
-            groups.append(Group(named, tuple(c.heading.replace(" [", "\n[") for c in measured), tuple(cells)))
+            groups.append(Group(named, tuple(c.heading.replace(" ", "\n") for c in measured), tuple(cells)))
     mean = [] if page.columns else [f"mean of {len({row.trial for row in rows})}"]
     below = [*mean, *(["the paper"] if with_paper else [])]
     return NumbersTable((*(heading for heading, _ in shown), *below), tuple(groups), len(below)) if groups else None

@@ -7,7 +7,6 @@ from typing import Any, ClassVar
 
 import data_synth
 from data_synth import Blank, Checkerboard
-from deskew.errors import require
 from experiments.reporting import Column, Layout, Plot
 from experiments.settings import Config
 from experiments.studies.accuracy_layout import FIGURES
@@ -17,6 +16,7 @@ from experiments.studies.noise_ratios import noise_ratios
 from experiments.studies.recipes import configured
 from experiments.studies.study import Study
 from experiments.studies.targets import figures, measured, photographed
+from experiments.studies.trial_sheets import refuse_sheets, severity
 from experiments.trials import Outcome, Recorder, TrialKey, trial_keys
 
 _DEFAULT = "default"
@@ -47,6 +47,8 @@ class Ablations(Study):
             Column("depth_printed_coverage", "printed, coverage", 4, headline=True),
             Column("bound_depth_mm", "depth RMS by noise alone [mm]", 3, headline=True),
             Column("depth_rms_ratio", "depth RMS / bound", 2, headline=True),
+            Column("slope_p90_deg", "p90 slope [deg]", 1, headline=True),
+            Column("relief_mm", "relief [mm]", 1, headline=True),
             Column("calib_camera_rms_px", "camera RMS [px]", 3),
             Column("calib_projector_rms_px", "projector RMS [px]", 3),
         ),
@@ -56,7 +58,7 @@ class Ablations(Study):
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan each pose on the default rig and on every changed one; at `smoke` on one changed rig a key."""
         require_methods(config)
-        require(not config.sheet.paths, "sheet.paths", "be left out: this experiment scans planes", config.sheet.paths)
+        refuse_sheets(config, "this experiment scans planes")
         return [key for condition in (_DEFAULT, *_changes(config)) for key in trial_keys(config, condition)]
 
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
@@ -81,7 +83,7 @@ class Ablations(Study):
                     shown["depth_printed_coverage"] = shown["depth_coverage"]
             ratios = noise_ratios(bench.rig, target, found, bench.calibration, shown)
             wanted = {column.metric for column in self.layout.columns}
-            every = shown | ratios | bench.residuals()
+            every = shown | ratios | severity(plane) | bench.residuals()
             record.add(key.condition, "-", {name: value for name, value in every.items() if name in wanted})
         return record.outcome()
 

@@ -45,6 +45,8 @@ _REST = (
     Column("depth_raw_p95_mm", "depth p95 [mm]", 3),
     Column("depth_raw_max_mm", "depth max [mm]", 3),
     Column("tilt_deg", "tilt [deg]", 1),
+    Column("slope_p90_deg", "p90 slope [deg]", 1),
+    Column("relief_mm", "relief [mm]", 1),
     Column("calib_camera_rms_px", "camera RMS [px]", 3),
     Column("calib_projector_rms_px", "projector RMS [px]", 3),
 )

@@ -18,11 +18,11 @@ from experiments.reporting import Column, FigurePage, Layout, Numbers, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
-from experiments.studies.given_sheets import read_sheet
 from experiments.studies.methods import require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.recipes import calibration_mode, methods_by_recipe
 from experiments.studies.study import Study
+from experiments.studies.trial_sheets import require_sheets, severity, sheet_inputs, trial_sheet
 from experiments.studies.views import DETECTORS, restored_corners, seen_corners
 from experiments.trials import Outcome, Recorder, TrialKey, reason_of
 
@@ -72,8 +72,8 @@ class CornerDistance(Study):
             Column("corners_expected", "expected", 0),
             Column("at_rest", "at rest", headline=True, share=True),
             Column("folded_quads", "folded quads", 0),
-            Column("slope_p90_deg", "p90 slope [deg]", 1),
-            Column("relief_mm", "relief [mm]", 1),
+            Column("slope_p90_deg", "p90 slope [deg]", 1, headline=True),
+            Column("relief_mm", "relief [mm]", 1, headline=True),
             Column("depth_raw_rms_mm", "depth RMS [mm]", 3),
             Column("depth_rms_mm", "filtered depth RMS [mm]", 3),
             Column("depth_coverage", "depth coverage", 4),
@@ -101,7 +101,7 @@ class CornerDistance(Study):
                 control=("control", "page_{column}_control"),
                 numbers=Numbers(
                     (("unrestored", "unrestored"), ("restored", "restored")),
-                    ("slope_p90_deg", "corner_mean_px", "corner_mean_mm"),
+                    ("slope_p90_deg", "relief_mm", "corner_mean_px", "corner_mean_mm"),
                 ),
             ),
         ),
@@ -111,15 +111,12 @@ class CornerDistance(Study):
         """Plan one trial a sheet."""
         require_methods(config)
         require(config.page.kind == "checkerboard", "page.kind", "be checkerboard, for its corners", config.page.kind)
-        n = len(config.sheet.paths)
-        require(n == 0 or config.trials <= n, "trials", f"be at most {n}, one a file of sheet.paths", config.trials)
-        for path in config.sheet.paths[: config.trials]:
-            read_sheet(Path(path), Checkerboard().page_size_mm)
+        require_sheets(config)
         return Study.plan(self, config)
 
     def inputs(self, config: Config) -> dict[str, Path]:
         """Name the given sheets."""
-        return {f"sheet.paths[{i}]": Path(path) for i, path in enumerate(config.sheet.paths)}
+        return sheet_inputs(config)
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials."""
@@ -130,7 +127,7 @@ class CornerDistance(Study):
         bench: Bench = shared
         record, rng, page = Recorder(key), key.generator(), Checkerboard()
         with record.stage("render"):
-            sheet = _sheet(config, key, rng)
+            sheet = trial_sheet(config, key, rng)
             flat, flat_truth = data_synth.render(bench.rig, data_synth.flat_sheet(page.page_size_mm), page, rng)
             capture, truth = data_synth.render(bench.rig, sheet, page, rng)
         trial = _Trial(record, bench, page, truth)
@@ -178,8 +175,7 @@ class _Trial:
         """Measure the crumpled page as it is, with its sheet and the calibration."""
         image = restoration.undistorted_view(capture.white, self.camera)
         self._compare("unrestored", "-", image, seen_corners(self.truth, self.corners_mm, self.camera, self.view))
-        shape = {"slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm}
-        self.record.add("unrestored", "-", self.bench.residuals() | shape)
+        self.record.add("unrestored", "-", self.bench.residuals() | severity(sheet))
         self._picture("crumpled", image)
 
     def scanned(
@@ -248,9 +244,3 @@ class _Trial:
         # As many pages as the paper shows: the reports are committed.
         if self.record.key.trial < _N_SHOWN:
             self.record.picture(f"page_{self.record.key.trial}_{name}", image)
-
-
-def _sheet(config: Config, key: TrialKey, rng: np.random.Generator) -> TrueSheet:
-    if not config.sheet.paths:
-        return data_synth.crumpled(rng, slope_p90_deg=config.sheet.slope_p90_deg)
-    return read_sheet(Path(config.sheet.paths[key.trial]), Checkerboard().page_size_mm)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,6 +19,7 @@ from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.methods import require_methods
 from experiments.studies.recipes import configured
 from experiments.studies.study import Study
+from experiments.studies.trial_sheets import require_sheets, severity, sheet_inputs, trial_sheet
 from experiments.trials import Outcome, Recorder, TrialKey
 
 _PERIOD_PX = 16.0
@@ -72,15 +74,20 @@ class Decoders(Study):
             Column("depth_raw_p95_mm", "depth p95 [mm]", 3, headline=True),
             Column("depth_raw_max_mm", "depth max [mm]", 2, headline=True),
             Column("depth_coverage", "coverage", 4, headline=True),
-            Column("slope_p90_deg", "slope p90 [deg]", 1),
+            Column("slope_p90_deg", "p90 slope [deg]", 1, headline=True),
+            Column("relief_mm", "relief [mm]", 1, headline=True),
         ),
     )
 
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial a sheet."""
         require_methods(config)
-        require(not config.sheet.paths, "sheet.paths", "be left out: this experiment draws sheets", config.sheet.paths)
+        require_sheets(config)
         return Study.plan(self, config)
+
+    def inputs(self, config: Config) -> dict[str, Path]:
+        """Name the given sheets."""
+        return sheet_inputs(config)
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials and all patterns, with line sweeps."""
@@ -90,13 +97,13 @@ class Decoders(Study):
         """Scan one sheet, blank and checkered, by every pattern at every number of frames."""
         bench: Bench = shared
         record, rng = Recorder(key), key.generator()
-        sheet = data_synth.crumpled(rng, slope_p90_deg=config.sheet.slope_p90_deg)
+        sheet = trial_sheet(config, key, rng)
         for name, page in (("white", Blank()), ("checkered", Checkerboard())):
             for allowed, plan in plans(bench.rig.projector.size, config.decoders.frames):
                 condition = f"{name}/{plan.pattern}/{allowed}"
                 with record.attempt(condition), record.stage("scan", condition):
                     figures = _depth_figures(config, bench, sheet, page, plan, rng)
-                    record.add(condition, "-", {"frames": plan.frames, "slope_p90_deg": sheet.slope_p90_deg, **figures})
+                    record.add(condition, "-", {"frames": plan.frames} | severity(sheet) | figures)
         return record.outcome()
 
 

@@ -12,7 +12,7 @@ import data_synth
 from data_synth import Blank, Checkerboard, Page
 from deskew import projection
 from deskew.acquisition import DepthSettings
-from deskew.errors import StepError, require
+from deskew.errors import StepError
 from deskew.types import Calibration
 from experiments.reporting import Layout
 from experiments.settings import Config
@@ -25,6 +25,7 @@ from experiments.studies.noise_ratios import noise_ratios
 from experiments.studies.recipes import configured
 from experiments.studies.study import Study
 from experiments.studies.targets import Measured, Target, figures, measured, photographed
+from experiments.studies.trial_sheets import refuse_sheets, severity
 from experiments.trials import Outcome, Recorder, TrialKey
 
 _PAGES: Mapping[str, Page] = {
@@ -77,7 +78,7 @@ class PlaneAccuracy(Study):
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial a pose."""
         require_methods(config)
-        require(not config.sheet.paths, "sheet.paths", "be left out: this experiment scans planes", config.sheet.paths)
+        refuse_sheets(config, "this experiment scans planes")
         return Study.plan(self, config)
 
     def prepare(self, config: Config) -> Bench:
@@ -114,7 +115,7 @@ def _measure(record: Recorder, condition: str, bench: Bench, target: Target) -> 
     sheet = target.truth.sheet
     shown = figures(target, found, bench.calibration)
     record.add(condition, "-", shown)
-    record.add(condition, "-", {"slope_p90_deg": sheet.slope_p90_deg, "relief_mm": sheet.relief_mm})
+    record.add(condition, "-", severity(sheet))
     with record.stage("bounds", condition):
         record.add(condition, "-", noise_ratios(bench.rig, target, found, bench.calibration, shown))
     if record.key.trial < _PICTURED:

@@ -23,6 +23,7 @@ from experiments.studies.methods import require_methods
 from experiments.studies.recipes import methods_by_recipe
 from experiments.studies.scanned import scanned_points
 from experiments.studies.study import AbsentError, Study
+from experiments.studies.trial_sheets import refuse_sheets
 from experiments.trials import Outcome, Recorder, TrialKey, content_digest, trial_keys
 
 # The captures' own README: 9 x 7 inner corners, 75 units a square, five poses.
@@ -90,7 +91,7 @@ class RealBoards(Study):
         """Plan one trial a board left out, and one for all boards."""
         require_methods(config)
         require(config.trials <= N_BOARDS, "trials", f"be at most {N_BOARDS}, one a board", config.trials)
-        require(not config.sheet.paths, "sheet.paths", "be left out: this experiment scans boards", config.sheet.paths)
+        refuse_sheets(config, "this experiment scans boards")
         path = config.real_boards.path
         if path is None:
             raise AbsentError("real_boards.path names no folder; README says where the captures are to be had")

@@ -13,7 +13,6 @@ import data_synth
 from data_synth import Checkerboard, Rig, TrueSheet
 from deskew import acquisition, flattening, pipeline, restoration
 from deskew.acquisition import DenoiseSettings, SweepSettings
-from deskew.errors import require
 from deskew.types import Calibration, Capture, Correspondence, DepthMap
 from experiments.reporting import Column, Layout, Times
 from experiments.settings import Config
@@ -21,6 +20,7 @@ from experiments.studies import flattening_times
 from experiments.studies.methods import require_methods
 from experiments.studies.stopwatch import TRIAD, Stopwatch
 from experiments.studies.study import Study
+from experiments.studies.trial_sheets import refuse_sheets
 from experiments.trials import Outcome, Recorder, TrialKey
 
 _MODES = ("spatial", "temporal")
@@ -104,7 +104,7 @@ class Speed(Study):
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial, whatever the number of repetitions: times are compared within one process only."""
         require_methods(config)
-        require(not config.sheet.paths, "sheet.paths", "be left out of this experiment", config.sheet.paths)
+        refuse_sheets(config, "this experiment times on mirror folds")
         return [TrialKey(config.experiment, seed=config.seed)]
 
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:

@@ -18,6 +18,7 @@ from experiments.reporting import Column, Layout, Plot, Times
 from experiments.settings import Config
 from experiments.studies.methods import require_methods
 from experiments.studies.study import Study
+from experiments.studies.trial_sheets import refuse_sheets, severity
 from experiments.trials import Outcome, Recorder, TrialKey, trial_keys
 
 _DENOISING = "spring"  # the one method that estimates noise and removes it
@@ -58,7 +59,8 @@ class Surfaces(Study):
             Column("area_error", "area error", 5),
             Column("noise_estimated_mm", "noise found [mm]", 3, headline=True),
             Column("vertices", "vertices", 0),
-            Column("relief_mm", "relief [mm]", 1),
+            Column("slope_p90_deg", "p90 slope [deg]", 1, headline=True),
+            Column("relief_mm", "relief [mm]", 1, headline=True),
         ),
         (Plot("flat_rigid_mean_mm", "flat_rigid_mean_mm", "mean distance from the truth, rigidly aligned [mm]"),),
         times=(
@@ -73,6 +75,7 @@ class Surfaces(Study):
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial a file, or one a kind and trial."""
         require_methods(config)
+        refuse_sheets(config, "this experiment flattens the meshes of surfaces.*")
         paths = [Path(path) for path in config.surfaces.paths]
         for path in paths:
             require(path.is_file(), "surfaces.paths", "name files", f"{path}, where there is none")
@@ -90,10 +93,8 @@ class Surfaces(Study):
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
         """Flatten one mesh by each method and measure the results."""
         record, rng = Recorder(key), key.generator()
-        mesh = _mesh(config, key, rng)
-        record.add(
-            key.condition, "-", {"vertices": len(mesh.vertices), "relief_mm": float(np.ptp(mesh.vertices[:, 2]))}
-        )
+        mesh, bent = _mesh(config, key, rng)
+        record.add(key.condition, "-", {"vertices": len(mesh.vertices)} | bent)
         scanned = mesh.vertices.copy()
         scanned[:, 2] += rng.normal(0.0, config.surfaces.noise_mm, len(scanned))
         for method in config.methods:
@@ -105,16 +106,16 @@ class Surfaces(Study):
         return record.outcome()
 
 
-def _mesh(config: Config, key: TrialKey, rng: np.random.Generator) -> Mesh:
-    """Read the trial's file or generate its kind."""
+def _mesh(config: Config, key: TrialKey, rng: np.random.Generator) -> tuple[Mesh, dict[str, float]]:
+    """Read the trial's file or generate its kind; say how bent it is, of a file how high alone."""
     if config.surfaces.paths:
         path = Path(config.surfaces.paths[key.trial])
         mesh = read_mesh(path)
         require(mesh.texture is not None, str(path), "hold texture coordinates, the flat places [mm]", "none")
-        return mesh
+        return mesh, {"relief_mm": float(np.ptp(mesh.vertices[:, 2]))}
     kind = key.condition.partition("/")[2]
     sheet = surfaces.generate(kind, int(rng.integers(1 << 62)))
-    return sheet_mesh(Sheet(sheet.vertices), sheet.flat)
+    return sheet_mesh(Sheet(sheet.vertices), sheet.flat), severity(sheet)
 
 
 def _flattened(sheet: Sheet, method: str) -> Flattened:

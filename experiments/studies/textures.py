@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,6 +23,7 @@ from experiments.studies.hidden_writing import Reader
 from experiments.studies.methods import require_methods
 from experiments.studies.recipes import calibration_mode, methods_by_recipe
 from experiments.studies.study import Study
+from experiments.studies.trial_sheets import require_sheets, severity, sheet_inputs, trial_sheet
 from experiments.trials import Outcome, Recorder, TrialKey
 
 # The camera of the paper's third experiment, whose video signal is scanned with: 1996 x 1450 pixels.
@@ -79,7 +81,8 @@ class TexturesStudy(Study):
             Column("registration_uncertainty_px", "stated uncertainty [texture px]", 3, headline=True),
             Column("dense_mean_mm", "dense mean [mm]", 3, headline=True),
             Column("at_rest", "at rest", headline=True, share=True),
-            Column("slope_p90_deg", "p90 slope [deg]", 1),
+            Column("slope_p90_deg", "p90 slope [deg]", 1, headline=True),
+            Column("relief_mm", "relief [mm]", 1, headline=True),
         ),
         (Plot("registration_error_px", "registration_error_px", "error of the map, RMS [texture px]", 0.3),),
         (
@@ -94,8 +97,12 @@ class TexturesStudy(Study):
         """Plan one trial a sheet."""
         require_methods(config)
         require(config.page.kind == "lettered", "page.kind", "be lettered in this experiment", config.page.kind)
-        require(not config.sheet.paths, "sheet.paths", "be left out of this experiment", config.sheet.paths)
+        require_sheets(config)
         return Study.plan(self, config)
+
+    def inputs(self, config: Config) -> dict[str, Path]:
+        """Name the given sheets."""
+        return sheet_inputs(config)
 
     def prepare(self, config: Config) -> Bench:
         """Calibrate once for all trials."""
@@ -107,11 +114,11 @@ class TexturesStudy(Study):
         record, rng = Recorder(key), key.generator()
         with record.stage("render"):
             page = data_synth.hidden_manuscript(rng)
-            sheet = data_synth.crumpled(rng, page.page_size_mm, config.sheet.slope_p90_deg)
+            sheet = trial_sheet(config, key, rng, page.page_size_mm)
             lights = (*data_synth.standard_lights(), *_fine_lights(rng, bench.rig.camera.size))
             capture, truth = data_synth.render(bench.rig, sheet, page, rng, lights=lights)
         trial = _Trial(record, page, truth, bench.calibration.camera)
-        record.add("unrestored/white", "-", {"slope_p90_deg": sheet.slope_p90_deg})
+        record.add("unrestored/white", "-", severity(sheet))
         for light in lights:
             if light.readout is not None:
                 trial.measure_registration(light, capture.textures[light.name], capture.white)

@@ -54,7 +54,7 @@ def test_hidden_writing_reads_where_it_should_and_nowhere_else(tmp_path: Path, m
     ("line", "message"),
     [
         ("experiment=textures page=checkerboard", "`page.kind` must be lettered"),
-        ("experiment=textures sheet.paths=[a.npz]", "`sheet.paths` must be left out"),
+        ("experiment=textures sheet.paths=[a.npz] trials=2", "`trials` must be at most 1"),
         ("experiment=corner_distance page=lettered", "`page.kind` must be checkerboard"),
     ],
 )
