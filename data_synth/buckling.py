@@ -14,9 +14,10 @@ from threadpoolctl import threadpool_limits
 
 from data_synth.leaf import Leaf
 from data_synth.plate import Plate
-from data_synth.plate_grids import Handles, flat_plate, free_plate, levelled, resampled
+from data_synth.plate_grids import Handles, flat_plate, free_plate, levelled
 from data_synth.relaxation import relax
 from data_synth.sheets import LEAST_CELL, TrueSheet, laid, least_cell, page_grid, page_grid_of
+from data_synth.splines import resampled
 from deskew.errors import StepError
 from deskew.types import Floats
 

@@ -19,7 +19,8 @@ PAL_SIZE: Size = (768, 576)
 KONTRON_SIZE: Size = (1996, 1450)
 """What it photographs in."""
 
-_SCALE, _ASPECT, _SHIFT_PX = (0.92, 1.02), (0.95, 1.05), 40.0
+# The video shows a little less than the photograph: its picture over the largest that fits, and its aspect.
+_SHARE, _ASPECT = (0.90, 0.96), (0.96, 1.04)
 
 
 def manuscript_rig(noise_scale: float = 1.0) -> Rig:
@@ -37,22 +38,13 @@ def manuscript_rig(noise_scale: float = 1.0) -> Rig:
     return replace(rig, camera=Format(PAL_SIZE, (finer, finer), (corner, corner)).camera(rig.camera))
 
 
-def kontron_readout(rng: np.random.Generator, scan_size: Size = PAL_SIZE) -> Format:
-    """Draw how the high resolution lies to the scan: its scale, aspect and crop are known to nobody.
-
-    Parameters
-    ----------
-    rng : numpy Generator
-        The only source of randomness.
-    scan_size : (width, height)
-        Pixels of the scan.
-    """
-    scale = KONTRON_SIZE[0] / scan_size[0] * float(rng.uniform(*_SCALE))
-    both = (scale, scale * float(rng.uniform(*_ASPECT)))
-    # What is left over of either picture, and where: a few per cent of the texture.
+def kontron_readout(rng: np.random.Generator) -> Format:
+    """Draw where the scan's picture lies in the photograph: all of it, at a scale, aspect and place known to nobody."""
+    scale = min(fine / coarse for fine, coarse in zip(KONTRON_SIZE, PAL_SIZE, strict=True)) * rng.uniform(*_SHARE)
+    both = float(scale), float(scale * rng.uniform(*_ASPECT))
     x, y = (
-        float((t - s * n) / 2 + rng.uniform(-_SHIFT_PX, _SHIFT_PX))
-        for t, s, n in zip(KONTRON_SIZE, both, scan_size, strict=True)
+        float(rng.uniform(0.0, fine - across * coarse))
+        for fine, across, coarse in zip(KONTRON_SIZE, both, PAL_SIZE, strict=True)
     )
     return Format(KONTRON_SIZE, both, (x, y))
 

@@ -14,9 +14,10 @@ from threadpoolctl import threadpool_limits
 
 from data_synth.developables import SHAPE
 from data_synth.plate import Plate
-from data_synth.plate_grids import Handles, flat_plate, free_plate, levelled, resampled, spline
+from data_synth.plate_grids import Handles, flat_plate, free_plate, levelled
 from data_synth.relaxation import relax, relax_plastically
 from data_synth.sheets import LEAST_CELL, PAGE_SIZE_MM, TrueSheet, laid, least_cell, page_grid_of, slopes_deg
+from data_synth.splines import resampled, spline
 from deskew.errors import StepError, require, require_positive, require_whole
 from deskew.types import Floats
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 
 from data_synth.folds import best_rotation
 from data_synth.plate import Plate, unbent, unchanged
@@ -58,20 +57,6 @@ def free_plate(shape: tuple[int, int], sizes: tuple[float, float], thickness_mm:
     spacing = (sizes[0] / (shape[0] - 1), sizes[1] / (shape[1] - 1))
     thickness = max(thickness_mm, _LEAST_THICKNESS * max(spacing))
     return Plate(spacing, thickness, unbent(shape), np.zeros(shape), np.zeros(shape), unchanged(shape))
-
-
-def resampled(x: Floats, shape: tuple[int, int]) -> Floats:
-    """Sample a grid of points (n, m, k) at another density by bicubic splines."""
-    return np.stack([spline(x[..., c], shape, 3) for c in range(x.shape[-1])], axis=-1)
-
-
-def spline(field: Floats, shape: tuple[int, int], degree: int) -> Floats:
-    """Sample a field (n, m) on a grid of another density, border to border, by splines of a degree."""
-    if field.shape == shape:
-        return field
-    here = [np.linspace(0.0, 1.0, n) for n in field.shape]
-    there = [np.linspace(0.0, 1.0, n) for n in shape]
-    return np.asarray(RectBivariateSpline(*here, field, kx=degree, ky=degree, s=0)(*there))
 
 
 def levelled(vertices: Floats, page_size_mm: tuple[float, float], turned: bool) -> Floats:

@@ -17,7 +17,7 @@ from data_synth.drawing import CELLS_PER_MM, drawn, integral_of, mean_over
 from data_synth.initial import initial
 from data_synth.leaf import Leaf
 from data_synth.pages import PAPER_ALBEDO
-from data_synth.plate_grids import spline
+from data_synth.splines import spline
 from deskew.types import Floats
 
 VELLUM_ALBEDO = 0.60
