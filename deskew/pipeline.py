@@ -199,6 +199,32 @@ def with_shading_removed(scan: Scan, capture: Capture, calibration: Calibration)
     return replace(scan, images={**scan.images, restoration.UNSHADED: unshaded})
 
 
+def find_leaf(scan: Scan, capture: Capture, calibration: Calibration) -> npt.NDArray[np.bool_]:
+    """Tell where a page is of a second, darker material, a leaf set in a sleeve, by the page's own texture.
+
+    Parameters
+    ----------
+    scan : Scan
+        The page, whose shape takes the shading out of its picture.
+    capture : Capture
+        It was scanned from this one.
+    calibration : Calibration
+        Of the same devices.
+
+    Returns
+    -------
+    (height, width) bool array
+        The leaf in raw pixels; a `StiffnessMap` gives both materials their constants.
+
+    Raises
+    ------
+    StepError
+        If the page does not show two materials.
+    """
+    unshaded = with_shading_removed(scan, capture, calibration).images[restoration.UNSHADED]
+    return acquisition.page_leaf(unshaded, acquisition.page_mask(capture.white, capture.black))
+
+
 def with_stiffness(scan: Scan, materials: StiffnessMap) -> Scan:
     """Give each quad of a scanned sheet the spring constant of the material seen at its middle (section 4.3).
 

@@ -108,7 +108,7 @@ class PageSettings(Checked):
     """What is printed on the sheet."""
 
     group: ClassVar[str] = "page."
-    kind: str = choice("checkerboard", "checkerboard", "lettered")
+    kind: str = choice("checkerboard", "checkerboard", "lettered", "vellum")
 
 
 @dataclass
@@ -243,6 +243,31 @@ class DecodersSettings(Checked):
     )
 
 
+def _ratios_to_both_sides(values: list[float]) -> bool:
+    allowed = all(isfinite(value) and 1e-4 <= value <= 1e4 for value in values)
+    return allowed and len(set(values)) == len(values) and min(values, default=1.0) < 1.0 < max(values, default=1.0)
+
+
+@dataclass
+class StiffnessSettings(Checked):
+    """The restoration of a page of two materials, a vellum leaf in a paper sleeve.
+
+    `vellum_over_paper`: ratios of stiffness under test; the least and the greatest are compared with each other.
+    `materials`: how the two are told apart, by the page's `texture`, or by a picture of the camera's size that is not
+    black where the vellum is.
+    """
+
+    group: ClassVar[str] = "stiffness."
+    vellum_over_paper: list[float] = setting(
+        [0.01, 0.1, 1.0, 10.0, 100.0],
+        "be a list of different numbers in [0.0001, 10000], some below and some above 1",
+        _ratios_to_both_sides,
+    )
+    materials: str = setting(
+        "texture", "be texture or a PNG file", lambda value: value == "texture" or value.lower().endswith(".png")
+    )
+
+
 @dataclass
 class Config(Checked):
     """The whole configuration of one run."""
@@ -267,6 +292,7 @@ class Config(Checked):
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
     surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
+    stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

@@ -96,7 +96,11 @@ def _best(candidates: list[tuple[str, Array]], scan: Array) -> Registration:
 
 
 def restore_textures(
-    scan: Scan, flattened: Flattened, lights: Iterable[str] | None = None, scale: float = 1.0
+    scan: Scan,
+    flattened: Flattened,
+    lights: Iterable[str] | None = None,
+    scale: float = 1.0,
+    registrations: Mapping[str, Registration] | None = None,
 ) -> Textures:
     """Texture the flattened page with the image of every light; nothing is flattened again.
 
@@ -111,6 +115,8 @@ def restore_textures(
     scale : float
         Pixels of the restored views for each of the camera's, in (0, 16]; a texture's own resolution is reached at its
         `Registration.scale`.
+    registrations : mapping of light name to Registration, optional
+        As :func:`register_textures` found them before, for every wanted light in another format.
 
     Raises
     ------
@@ -128,7 +134,7 @@ def restore_textures(
     # Every image of a format helps to find its map, wanted or not.
     formats = {scan.images[light].shape[1::-1] for light in wanted} - {size}
     others = {light: image for light, image in scan.images.items() if image.shape[1::-1] in formats}
-    registrations = register_textures(others, white)
+    registrations = register_textures(others, white) if registrations is None else registrations
     plain = texture_quads(white, scan.camera, scan.sheet, flattened, scale)
     images = {}
     for light in wanted:

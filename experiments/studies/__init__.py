@@ -13,6 +13,7 @@ STUDIES = {
     "corner_distance": "experiments.studies.corner_distance:CornerDistance",
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
+    "stiffness": "experiments.studies.stiffness:Stiffness",
     "real_boards": "experiments.studies.real_boards:RealBoards",
     "surfaces": "experiments.studies.surfaces:Surfaces",
     "speed": "experiments.studies.speed:Speed",

@@ -16,7 +16,7 @@ from experiments.trials.schema import TrialKey
 # What is ablated stands in the trial's own key.
 _NO_PART_OF_A_ROW = ("engine", "out", "budget", "trials", "trials_at", "ablations")
 # Keys that belong to one experiment only.
-_SECTIONS = ("real_boards", "surfaces")
+_SECTIONS = ("real_boards", "stiffness", "surfaces")
 # Sources that rows come from; reporting and the program around it change no row.
 SOURCES = (
     "deskew",
@@ -51,7 +51,8 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
     for key, path in inputs.items():
         settings[f"sha256 of {key}"] = content_digest(sorted(path.rglob("*")) if path.is_dir() else [path], path)
     # The kinds of surfaces, as what is ablated, stand in the trial's own key.
-    for group, key in (("real_boards", "path"), ("sheet", "paths"), ("surfaces", "paths"), ("surfaces", "kinds")):
+    paths = (("real_boards", "path"), ("sheet", "paths"), ("stiffness", "materials"), ("surfaces", "paths"))
+    for group, key in (*paths, ("surfaces", "kinds")):
         settings.get(group, {}).pop(key, None)
     return settings
 
