@@ -105,10 +105,15 @@ class SheetSettings(Checked):
 
 @dataclass
 class PageSettings(Checked):
-    """What is printed on the sheet."""
+    """What is printed on the sheet.
+
+    `text`: of a lettered page in the experiment `ocr_misses`, always 176 letters: pseudo-words of the 22 capitals that
+    readers tell apart best, of all 26, or plain English in lower case.
+    """
 
     group: ClassVar[str] = "page."
     kind: str = choice("checkerboard", "checkerboard", "lettered", "vellum")
+    text: str = choice("capitals", "capitals", "full", "prose")
 
 
 @dataclass
@@ -209,6 +214,28 @@ class RealBoardsSettings(Checked):
 
 
 @dataclass
+class ReadingSettings(Checked):
+    """How pages are read, and which.
+
+    `engine`: never replaced by the other one. `psm`: page segmentation mode; 6 is one block of text.
+    `severities`: further 90th percentiles of slope at which pages are read.
+    `restore`: false reads unrestored pages alone and scans none, which is how a severity is chosen.
+    `real_path`: folder of photographed documents with their words; they are not part of the project.
+    """
+
+    group: ClassVar[str] = "ocr."
+    engine: str = choice("tesserocr", "tesserocr", "pytesseract")
+    psm: int = count(6, 3, 13)
+    severities: list[float] = setting(
+        [],
+        "be a list of different numbers in [1, 45] degrees",
+        lambda values: len(set(values)) == len(values) and all(1.0 <= value <= 45.0 for value in values),
+    )
+    restore: bool = True
+    real_path: str | None = None
+
+
+@dataclass
 class SurfacesSettings(Checked):
     """The flattening of meshes that store their flat sheet.
 
@@ -290,6 +317,7 @@ class Config(Checked):
     mesh: MeshSettings = field(default_factory=MeshSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
+    ocr: ReadingSettings = field(default_factory=ReadingSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
     surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
     stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)

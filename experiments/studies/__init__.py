@@ -11,6 +11,7 @@ STUDIES = {
     "plane_accuracy": "experiments.studies.plane_accuracy:PlaneAccuracy",
     "ablations": "experiments.studies.ablations:Ablations",
     "corner_distance": "experiments.studies.corner_distance:CornerDistance",
+    "ocr_misses": "experiments.studies.ocr_misses:OcrMisses",
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
     "stiffness": "experiments.studies.stiffness:Stiffness",

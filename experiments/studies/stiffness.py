@@ -25,7 +25,7 @@ from experiments.studies.methods import require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.recipes import calibration_mode, configured
 from experiments.studies.registered import map_error
-from experiments.studies.stiffness_layout import FREE, LAYOUT, restored
+from experiments.studies.stiffness_layout import LAYOUT, by_dynamics, freely_scaled, restored
 from experiments.studies.study import Study
 from experiments.studies.trial_sheets import severity
 from experiments.studies.two_material_sheets import case_keys, two_materials
@@ -45,7 +45,7 @@ class Stiffness(Study):
     """A vellum leaf in a paper sleeve, scanned in PAL, photographed at 1996 x 1450, restored with many stiffnesses.
 
     The first method takes every ratio, any further one that of the right material alone, as a check. All restore the
-    same scan, which is made as the first one's recipe says, and all take rest lengths along its surface.
+    same scan, made as the first one's recipe says, and take rest lengths along its surface.
 
     Conditions
     ----------
@@ -54,7 +54,11 @@ class Stiffness(Study):
     `restored/A/vellum_over_paper=0.01`, ...
         The page restored with the vellum a hundredth as stiff as the paper.
     `restored/A/free_scale`, ...
-        Restored at the right end of the ratios (in case N at the lower one), with a free scale for the soft material.
+        Restored with the right material the stiffer one (in case N the vellum) and a free scale for the soft one.
+    `dynamics/A/vellum_over_paper=0.01`, ...
+        Restored with the right material the stiffer one by the methods after the first.
+    `difference/A`, ...
+        The photograph registered to the scan, and the restorations at both ends of the ratios subtracted.
     """
 
     layout: ClassVar[Layout] = LAYOUT
@@ -149,9 +153,9 @@ class _Trial:
         errors = {ratio: self._restored(restored(self.case, ratio), first, ratio) for ratio in ratios}
         self._add_gains(restored(self.case, right), first, errors[right], errors[wrong], errors.get(1.0))
         for method in others:
-            self._restored(restored(self.case, right), method, right)
+            self._restored(by_dynamics(self.case, right), method, right)
         if first == "spring":
-            place = restored(self.case, FREE)
+            place = freely_scaled(self.case)
             beyond = self._restored(place, first, right, free=True)
             self._add_gains(place, first, beyond, errors[wrong], errors.get(1.0))
 

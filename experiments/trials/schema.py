@@ -10,7 +10,7 @@ import numpy as np
 from deskew.errors import require
 
 # The unit is the name's last word; a metric without one is a count, a ratio or a flag.
-_UNITS = {"px": "px", "mm": "mm", "deg": "deg", "rad": "rad", "units": "units", "mb": "MB", "s": "s"}
+_UNITS = {"px": "px", "mm": "mm", "deg": "deg", "rad": "rad", "units": "units", "percent": "%", "mb": "MB", "s": "s"}
 
 
 def unit_of(metric: str) -> str:
