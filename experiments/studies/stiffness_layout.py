@@ -94,7 +94,7 @@ LAYOUT = Layout(
             "vellum_over_paper",
             "stiffness of the vellum over that of the paper",
             f"{region}_mean_mm",
-            f"{text}: mean distance from the true place [mm]",
+            f"{text}: mean error [mm]",
             tuple(f"restored/{case}" for case in Case),
             log=True,
         )
