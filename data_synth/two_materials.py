@@ -12,7 +12,6 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
@@ -29,7 +28,8 @@ from data_synth.materials import (
 )
 from data_synth.plate import unchanged
 from data_synth.sheets import least_cell
-from deskew.errors import DeskewError, InputError, require, require_whole
+from data_synth.surfaces import CommandParser, made_folder
+from deskew.errors import DeskewError, require, require_whole
 from deskew.types import Floats
 
 
@@ -49,16 +49,9 @@ def described(two: TwoMaterials, growth: Floats) -> str:
     )
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser that would print its usage and exit, made to complain in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        raise InputError(f"The arguments must be as --help shows, got: {message}.")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
-    parser = _Parser(prog="python -m data_synth.two_materials", description=(__doc__ or "").split("\n")[0])
+    parser = CommandParser(prog="python -m data_synth.two_materials", description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path, help="made if it does not exist")
     parser.add_argument("--case", default="A,B,N", help="one or more, comma between [%(default)s]")
     parser.add_argument("--count", type=int, default=5, help="sheets of each case [%(default)s]")
@@ -82,10 +75,7 @@ def _write_all(options: argparse.Namespace) -> None:
     shape = options.rows, options.columns
     for name, n in zip(("rows", "columns"), shape, strict=True):
         require_whole(name, n, 8, 400)
-    try:
-        options.folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"`folder` must be a folder or a place for one, got {error.strerror or error}.") from error
+    made_folder(options.folder)
     for case in map(Case, names):
         for seed in range(options.seed, options.seed + options.count):
             two = draw_two_materials(generator(case, seed), case, shape)
