@@ -86,7 +86,7 @@ class Stiffness(Study):
         bench: Bench = shared
         record, rng = Recorder(key), key.generator()
         with record.stage("sheet"):
-            two = two_materials(config, key)
+            two = two_materials(config, key, rng)
         with record.stage("render"):
             page, light = VellumPage(int(rng.integers(1 << 31)), two.leaf), data_synth.kontron_light(rng)
             capture, truth = data_synth.render(bench.rig, two.sheet, page, rng, lights=(light,))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 import data_synth
 from data_synth import PAGE_SIZE_MM, Case, TwoMaterials, read_two_materials
 from deskew.errors import require
@@ -39,17 +41,26 @@ def case_of(key: TrialKey) -> Case:
     return Case(key.condition.rsplit("/", 1)[-1])
 
 
-def two_materials(config: Config, key: TrialKey) -> TwoMaterials:
+def two_materials(config: Config, key: TrialKey, rng: np.random.Generator) -> TwoMaterials:
     """Return a trial's sheet, fine enough to be rendered.
 
     Trial i takes file i of `sheet.paths`; without any, shipped sheet i modulo 5 of its case, or with `sheet.drawn` one
-    drawn from its own seed.
+    of its own.
+
+    Parameters
+    ----------
+    config : Config
+        Its `sheet`.
+    key : TrialKey
+        One that :func:`case_keys` planned.
+    rng : numpy Generator
+        The trial's own; only drawn sheets take from it.
     """
     case = case_of(key)
     if config.sheet.paths:
         two = read_two_materials(Path(config.sheet.paths[key.trial]))
     elif config.sheet.drawn:
-        two = data_synth.draw_two_materials(key.generator(), case)
+        two = data_synth.draw_two_materials(rng, case)
     else:
         two = data_synth.shipped_two_materials(case, key.trial % data_synth.N_SHIPPED)
     return replace(two, sheet=data_synth.refined(two.sheet))

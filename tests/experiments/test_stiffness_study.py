@@ -14,10 +14,13 @@ from data_synth import Case, Leaf
 from deskew.io import write_image
 from deskew.types import Calibration, Pinhole
 from experiments.program import main
+from experiments.reporting.curves import curve_plot
 from experiments.settings import Config
 from experiments.studies import stiffness
 from experiments.studies.bench import Bench
 from experiments.studies.stiffness import material_figures
+from experiments.studies.stiffness_layout import LAYOUT
+from experiments.trials.schema import Row
 
 SHIPPED = Path(data_synth.__file__).parent / "shipped"
 
@@ -72,6 +75,24 @@ def test_the_page_is_printed_like_the_papers_figure_5(out: Path) -> None:
     names = {path.name for path in (out / "figures").iterdir()}
     assert names == {"figure_5.png", "kept_against_ratio.png", "changed_against_ratio.png"}
     assert "**A: the vellum shrank.**" in (out / "table.md").read_text()
+
+
+def test_errors_are_drawn_against_ratios_on_logarithmic_axes() -> None:
+    curve = LAYOUT.curves[0]
+    ratios = {0.01: 0.3, 1.0: 2.0, 100.0: 2.1}
+    rows = [
+        Row("stiffness", f"restored/A/vellum_over_paper={ratio:g}", "spring", trial, 1, metric, value, "mm")
+        for ratio, error in ratios.items()
+        for trial in (0, 1)
+        for metric, value in (("vellum_over_paper", ratio), ("kept_mean_mm", error * (1 + 0.1 * trial)))
+    ]
+    figure = curve_plot(curve, rows)
+    assert figure is not None
+    (axes,) = figure.axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    drawn = axes.lines[0]
+    assert np.allclose(drawn.get_xdata(), list(ratios))
+    assert np.allclose(drawn.get_ydata(), [1.05 * error for error in ratios.values()])
 
 
 def test_border_is_off_by_what_was_shaved_off() -> None:
