@@ -38,7 +38,7 @@ LEAF, SLEEVE = 1, 0
 
 _PHOTOGRAPH = "kontron"
 _SCALE = 2.0  # restored pixels of the photograph for each of the scan's
-_DIFFERENCE_GAIN = 2.0
+_DIFFERENCE_GAIN, _DESK_GREY = 2.0, 200.0
 
 
 class Stiffness(Study):
@@ -143,7 +143,8 @@ class _Trial:
         figures |= material_figures(self.leaf, self.truth.page_at(pixel_grid(camera.size)), self.two.leaf)
         self.record.add(f"unrestored/{self.case}", "-", figures)
         self._picture("captured", restoration.undistorted_view(capture.white, camera))
-        self._picture("model", model_view(self.scan.sheet.vertices))
+        sheet = self.scan.sheet
+        self._picture("model", model_view(sheet.vertices if sheet.surface is None else sheet.surface))
 
     def restore_all(self, config: Config) -> None:
         """Restore with every ratio, then with what is right and what is beyond the paper; compare."""
@@ -219,7 +220,7 @@ class _Trial:
         self.record.add(place, "-", figures | found)
         self._picture("vellum", _halved(first.images[name]))
         self._picture("paper", _halved(second.images[name]))
-        self._picture("difference", _halved(255.0 - _DIFFERENCE_GAIN * np.abs(difference)))
+        self._picture("difference", _halved(np.where(page, 255.0 - _DIFFERENCE_GAIN * np.abs(difference), _DESK_GREY)))
 
     def _picture(self, name: str, image: Array) -> None:
         if self.record.key.trial == 0:

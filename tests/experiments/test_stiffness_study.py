@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import data_synth
-from data_synth import Case, Leaf
+from data_synth import Case, Leaf, kontron
 from deskew.io import write_image
 from deskew.types import Calibration, Pinhole
 from experiments.program import main
@@ -41,6 +41,8 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(stiffness, "calibrated_bench", true_bench)
+        patch.setattr(kontron, "KONTRON_SIZE", (998, 725))  # a quarter of the photograph's pixels, and of its time
+        patch.setattr(stiffness, "_SCALE", 1.0)
         assert main([*line.split(), f"out={folder}"]) == 0
     return folder
 

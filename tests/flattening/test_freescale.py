@@ -42,8 +42,18 @@ def settle(x: Floats, springs: Springs) -> Iterated:
     return _settle_uneven(x, springs, 3e-5, 100)
 
 
-@pytest.mark.parametrize("factor", [0.98, 0.995, 1.0, 1.02, 1.3])
-@pytest.mark.parametrize(("inner", "outer"), [(0.01, 1.0), (1.0, 0.01), (1e-4, 1.0), (1.0, 1e-4)])
+@pytest.mark.parametrize(
+    ("factor", "inner", "outer"),
+    [
+        (0.98, 0.01, 1.0),
+        (0.98, 1.0, 0.01),
+        (1.02, 0.01, 1.0),
+        (1.02, 1.0, 1e-4),
+        (1.0, 1e-4, 1.0),
+        (1.3, 1.0, 0.01),
+        (0.995, 1e-4, 1.0),
+    ],
+)
 def test_uniform_change_is_recovered_and_undone(factor: float, inner: float, outer: float) -> None:
     sheet = plate(inner=inner, outer=outer)
     part = changed(sheet, factor)
@@ -69,7 +79,7 @@ def test_change_takes_few_solves() -> None:
 
 
 @pytest.mark.parametrize(("inner", "outer"), [(0.01, 1.0), (1.0, 0.01)])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_sheet_that_never_changed_keeps_its_scale(seed: int, inner: float, outer: float) -> None:
     dense, flat = mirror_folds(seed, (177, 177), 15.0)
     vertices = dense[::4, ::4]
@@ -88,7 +98,7 @@ def dome(height_mm: float = 25.0) -> Array:
     return flat
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(angle=st.floats(-3.1, 3.1), x=st.floats(-300, 300), y=st.floats(-300, 300), k=st.sampled_from([1e-3, 1.0, 1e6]))
 def test_scale_does_not_depend_on_where_the_sheet_lies_nor_on_its_unit_of_stiffness(
     angle: float, x: float, y: float, k: float
