@@ -98,7 +98,7 @@ def test_severities_are_read_unrestored_alone_and_the_other_engine_agrees(tmp_pa
         assert main([*line.split(), f"ocr.engine={engine}", f"out={out}"]) == 0
         found[engine] = rows_of(out)
         assert json.loads((out / "run.json").read_text())["ocr"]["engine"] == engine
-        assert {place for place in found[engine]} == {
+        assert set(found[engine]) == {
             ("control", "-"),
             ("unrestored", "-"),
             ("unrestored/slope=44", "-"),
