@@ -50,7 +50,8 @@ def restore(
 
     With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
 
-    A stiffness map has the white image's frame.
+    A stiffness map has the white image's frame. A scan made with --unshaded has the light `unshaded`: the page without
+    the projector's shading.
 
     Example: deskew restore scan.npz -o restored.png --light white --light uv --combine ratio:uv/white
     """
@@ -89,7 +90,8 @@ def run(
 
     With more than one picture each is named after its light or combination: restored-uv.png, restored-mean.png.
 
-    A stiffness map has the white image's frame.
+    A stiffness map has the white image's frame. The light `unshaded` is white without the projector's shading, which
+    the page's shape tells.
 
     Example: deskew run page/ --calibration calibration.json -o restored.png --light uv
     """

@@ -30,7 +30,7 @@ def curve_points(curve: Curve, rows: Sequence[Row]) -> dict[str, list[Point]]:
     Parameters
     ----------
     curve : Curve
-        What to draw; x is looked for in a point's own rows.
+        What to draw.
     rows : sequence of Row
         All results.
     """
@@ -42,7 +42,7 @@ def curve_points(curve: Curve, rows: Sequence[Row]) -> dict[str, list[Point]]:
         for condition, method, metric in sorted(values):
             if metric != curve.y or (condition != line and not condition.startswith(f"{line}/")):
                 continue
-            across = values.get((condition, method, curve.x))
+            across = values.get((curve.conditions[0] + condition.removeprefix(line), "-", curve.x))
             if across:
                 name = line if method == "-" else f"{line} {method}"
                 lines[name].append(Point(fmean(across), summarise(values[condition, method, metric])))

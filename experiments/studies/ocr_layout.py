@@ -5,7 +5,7 @@ from __future__ import annotations
 from experiments.reporting import Column, Curve, FigurePage, Layout, Numbers, Section
 
 _LETTERS = 176
-_PAPER = {"control": "0", "unrestored": "5..10 %", "restored": "1..3"}
+_PAPER = {"control": "0", "unrestored": "9..18", "restored": "1..3"}
 _PARTS = ("substitutions", "insertions", "deletions", "misses_paper")
 _WAYS = {"_normalised": "normalised", "_projector": "projector light", "_unshaded": "shading removed"}
 
@@ -116,7 +116,7 @@ LAYOUT = Layout(
             control=("control", "page_{column}_control"),
             numbers=Numbers(
                 (("control", "control"), ("unrestored", "unrestored"), ("restored", "restored")),
-                ("misses", "error_rate_percent"),
+                ("slope_p90_deg", "relief_mm", "misses", "error_rate_percent"),
             ),
         ),
     ),

@@ -133,9 +133,10 @@ class _Trial:
         with self.record.stage("render"):
             words = data_synth.page_words(self.rng, Text(config.page.text))
             self.page = Lettered(words, capital_mm=_CAPITAL_MM, margin_mm=_MARGIN_MM)
-            sheet = trial_sheet(config, key, self.rng)
-            self.capture, self.truth = data_synth.render(self.bench.rig, sheet, self.page, self.rng, lights=(SOFT,))
-        self.severity = severity(sheet)
+            self.sheet = trial_sheet(config, key, self.rng)
+            self.capture, self.truth = data_synth.render(
+                self.bench.rig, self.sheet, self.page, self.rng, lights=(SOFT,)
+            )
         self.reader = PageReader(shared.engine, self.page, restoration.view_camera(self.camera))
         self.scans: dict[Recipe, Scan] = {}
         self.pixels: Floats = restoration.undistortion_map(self.camera).astype(np.float64)
@@ -160,7 +161,7 @@ class _Trial:
             images[UNSHADED] = scan.images[UNSHADED]
             seen = scan.sheet.vertices if scan.sheet.surface is None else scan.sheet.surface
             self._picture("model", model_view(seen))
-        figures = self._read_flat_view("unrestored", images, self.truth)
+        figures = self._read_as_it_lies(f"unrestored{self.at}", images, self.truth) | severity(self.sheet)
         self.record.add(f"unrestored{self.at}", "-", figures | ({} if self.at else self.bench.residuals()))
         self._picture("crumpled", restoration.undistorted_view(self.capture.textures[SOFT.name], self.camera))
 
@@ -176,7 +177,7 @@ class _Trial:
             flat.white, flat.black, self.camera, self.bench.calibration.projector, bed
         )
         images = {WHITE: flat.white, UNSHADED: unshaded, **flat.textures}
-        self.record.add("control", "-", self._read_flat_view("control", images, truth))
+        self.record.add("control", "-", self._read_as_it_lies("control", images, truth))
         self._picture("control", restoration.undistorted_view(flat.textures[SOFT.name], self.camera))
 
     def measure_restored(self, recipe: Recipe, method: str) -> None:
@@ -188,19 +189,18 @@ class _Trial:
                 restored = pipeline.restore_lights(scan, method=method, lights=lights)
             uv = self.truth.page_at(restored.backward_map.astype(np.float64))
             figures = metrics.dense_error(restored.restoration(WHITE), uv, self.page.page_size_mm)
-            figures |= flattening_figures(scan.sheet, restored.flattened) | self.severity
+            figures |= flattening_figures(scan.sheet, restored.flattened)
             filtered = {"prefix": "depth"} if recipe.denoise else {}
             figures |= metrics.depth_error(scan.depth, self.truth.points_at(self.pixels), **filtered)
             self.record.add(condition, method, figures | self._read(condition, method, restored.images, uv))
             if method == self.config.methods[0]:
                 self._picture(f"restored_{method}", restored.images[SOFT.name])
 
-    def _read_flat_view(self, condition: str, images: Mapping[str, Array], truth: Truth) -> dict[str, float]:
-        """Read pictures of a page as it lay, undistorted like all others."""
+    def _read_as_it_lies(self, condition: str, images: Mapping[str, Array], truth: Truth) -> dict[str, float]:
+        """Read raw images of a page, undistorted and no more."""
         uv = truth.page_at(self.pixels)
         views = {light: restoration.undistorted_view(image, self.camera) for light, image in images.items()}
-        figures = self._read(f"{condition}{self.at}", "-", views, uv)
-        return figures if condition == "control" else figures | self.severity
+        return self._read(condition, "-", views, uv)
 
     def _read(self, condition: str, method: str, views: Mapping[str, Array], uv: Floats) -> dict[str, float]:
         """Return the figures of a page's pictures by light, with the true page coordinates of their pixels."""

@@ -93,6 +93,10 @@ class StandIn:
         self._step("stiffness", materials=materials)
         return scan
 
+    def with_shading_removed(self, scan: Scan, page: Capture, calibration: Calibration) -> Scan:
+        self._step("unshade", calibration=calibration)
+        return replace(scan, images={**scan.images, "unshaded": page.white - page.black})
+
     def restore_lights(
         self, scan: Scan, *, method: str, lights: Sequence[str], scale: float, **settings: object
     ) -> Textures:
@@ -267,6 +271,23 @@ def test_every_light_and_combination_is_written_on_request(
     assert json.loads(out)["restored"] == [f"out/{name}" for name in names]
     assert sorted(path.name for path in (here / "out").iterdir()) == sorted(names)
     assert np.array_equal(io.read_image(here / "out" / "r-uv.png"), uv)
+
+
+def test_the_projectors_shading_is_removed_when_asked_for(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    even = (capture().white - capture().black)[::-1]
+    assert run("run page -c c.json -o out/plain.png --combine mean", capsys)[0] == 0
+    assert "unshade" not in steps.calls
+    assert run("run page -c c.json -o out/r.png --light unshaded", capsys)[0] == 0
+    assert np.array_equal(io.read_image(here / "out" / "r.png"), even)
+    assert run("run page -c c.json -o out/q.png --combine ratio:unshaded/white", capsys)[0] == 0
+    assert steps.calls["restore"]["lights"] == ["unshaded", "white"]
+    assert run("scan page -c c.json -o out/s.npz --unshaded", capsys)[0] == 0
+    assert run("restore out/s.npz -o out/t.png --light unshaded", capsys)[0] == 0
+    assert np.array_equal(io.read_image(here / "out" / "t.png"), even)
+    code, _, err = run("restore scan.npz -o out/u.png --light unshaded", capsys)
+    assert (code, err) == (2, "deskew: `--light` must be one of white, uv, got unshaded.\n")
 
 
 def test_combinations_alone_are_made_of_all_lights(
