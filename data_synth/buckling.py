@@ -110,7 +110,8 @@ def buckled(rng: np.random.Generator, change: Change, shape: tuple[int, int], th
     Returns
     -------
     TrueSheet
-        At rest without load, levelled, on the bed; its page coordinates are those before the change.
+        Let go, relaxed by a fixed number of steps (it would go on curling slowly), levelled, on the bed; its page
+        coordinates are those before the change.
 
     Raises
     ------

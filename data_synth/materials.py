@@ -51,7 +51,7 @@ class TwoMaterials:
     ----------
     sheet : TrueSheet
         Its page coordinates are those before anything changed size: what is printed was printed then. To be rendered
-        it is refined first (:func:`data_synth.refined`), or its facets show.
+        it is refined first, ``refined(sheet, chords=True)``, or its facets show.
     leaf : Leaf
         Where the vellum is, in page coordinates.
     case : Case

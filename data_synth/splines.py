@@ -9,12 +9,13 @@ from deskew.types import Floats
 
 
 def spline(field: Floats, shape: tuple[int, int], degree: int) -> Floats:
-    """Sample a field (n, m) on a grid of another shape by splines of a degree."""
+    """Sample a field (n, m) on a grid of another shape by splines of a degree, of less on too few vertices."""
     if field.shape == shape:
         return field
     here = [np.linspace(0.0, 1.0, n) for n in field.shape]
     there = [np.linspace(0.0, 1.0, n) for n in shape]
-    return np.asarray(RectBivariateSpline(*here, field, kx=degree, ky=degree, s=0)(*there))
+    kx, ky = (min(degree, n - 1) for n in field.shape)
+    return np.asarray(RectBivariateSpline(*here, field, kx=kx, ky=ky, s=0)(*there))
 
 
 def resampled(x: Floats, shape: tuple[int, int]) -> Floats:

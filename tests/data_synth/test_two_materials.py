@@ -27,7 +27,7 @@ def test_a_shipped_sheet_is_that_of_its_seed_and_keeps_the_lengths_that_it_wants
     assert two.leaf.size_mm == pytest.approx(ds.Leaf().size_mm, abs=1e-4)
     assert 10 < two.sheet.relief_mm < 30
     assert least_cell(two.sheet.vertices) > 0.3
-    # With another seed's growth the strain would be ten times as large.
+    # With another seed's growth the strain would be twenty times as large.
     strain = np.abs(metric_strain(two.sheet, true_growth(case, index, SHAPE)))
     assert 3e-5 < strain.mean() < 3e-4
     assert np.percentile(strain, 99) < 3e-3
