@@ -42,7 +42,8 @@ def curve_points(curve: Curve, rows: Sequence[Row]) -> dict[str, list[Point]]:
         for condition, method, metric in sorted(values):
             if metric != curve.y or (condition != line and not condition.startswith(f"{line}/")):
                 continue
-            across = values.get((curve.conditions[0] + condition.removeprefix(line), "-", curve.x))
+            elsewhere = curve.conditions[0] + condition.removeprefix(line), "-", curve.x
+            across = values.get((condition, method, curve.x)) or values.get(elsewhere)
             if across:
                 name = line if method == "-" else f"{line} {method}"
                 lines[name].append(Point(fmean(across), summarise(values[condition, method, metric])))

@@ -72,8 +72,8 @@ class Curve:
     x, x_label, y, y_label : str
         The metrics, and how their axes are called, with the unit.
     conditions : tuple of str
-        A line each; its points are the condition and those that go on with "/" after it. The first one's rows tell
-        where a point of any line stands across.
+        A line each; its points are the condition and those that go on with "/" after it. A point's own rows tell where
+        it stands across, or else those of the first line.
     bands : tuple of (text, low, high)
         The paper's figures, drawn as bands across; in y's unit.
     log : bool
