@@ -6,7 +6,6 @@ and nothing but the growth shapes it: handles that move it by 2 mm only choose w
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,12 +20,10 @@ from data_synth.splines import resampled
 from deskew.errors import StepError
 from deskew.types import Floats
 
-Field = Callable[[Floats, Floats], Floats]
-"""A quantity at page points (u, v) [mm]."""
-
 _COARSE = (79, 61)  # (long side, short side): buckled on this grid, refined to the one asked for
 _N_HANDLES, _AMPLITUDE_MM, _PULL = 14, 2.0, 0.05
-_RAMP, _RAMP_STEPS, _RELEASE_STEPS, _FINE_STEPS = 8, 6, 40, 12
+_RAMP, _RAMP_STEPS = 8, 6  # parts that the growth sets in by, and the descent's steps after each
+_RELEASE_STEPS, _FINE_STEPS = 40, 12
 _N_WAVES, _WAVES_MM = 8, (100.0, 300.0)
 _BLEND_MM, _WELL_INSIDE_MM = 6.0, 8.0
 _PROBE_MM = 2.0
@@ -43,8 +40,8 @@ class Change:
     on_leaf : bool
         Whether the vellum changed or the sleeve.
     mean : float
-        Mean over the page of the smooth field of relative changes of length, negative for a shrinkage; the field runs
-        from 0 to no more than twice of it.
+        Mean over the page of the smooth field of relative changes of length, negative for a shrinkage; the field lies
+        between 0 and twice of it.
     waves : (n, 3) array
         Wave vectors along u and v [1/mm] and phases [rad] of the cosines that the field is the sum of.
     """
