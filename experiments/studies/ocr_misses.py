@@ -148,7 +148,7 @@ class _Trial:
             try:
                 with self.record.stage("scan"):
                     found = pipeline.scan_by(recipe, self.capture, self.bench.calibration, shape=shape)
-                self.scans[recipe] = pipeline.with_shading_removed(found, self.capture, self.bench.calibration)
+                self.scans[recipe] = pipeline.with_shading_removed(found, self.capture, self.bench.calibration, recipe)
             except Exception as error:
                 for method in methods:
                     self.record.fail(f"restored{self.at}", method, reason_of(error))

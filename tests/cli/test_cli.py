@@ -93,8 +93,8 @@ class StandIn:
         self._step("stiffness", materials=materials)
         return scan
 
-    def with_shading_removed(self, scan: Scan, page: Capture, calibration: Calibration) -> Scan:
-        self._step("unshade", calibration=calibration)
+    def with_shading_removed(self, scan: Scan, page: Capture, calibration: Calibration, recipe: Recipe) -> Scan:
+        self._step("unshade", calibration=calibration, recipe=recipe)
         return replace(scan, images={**scan.images, "unshaded": page.white - page.black})
 
     def restore_lights(
