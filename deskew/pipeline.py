@@ -226,8 +226,9 @@ def find_leaf(scan: Scan, capture: Capture, calibration: Calibration) -> npt.NDA
     StepError
         If the page does not show two materials.
     """
-    unshaded = with_shading_removed(scan, capture, calibration).images[restoration.UNSHADED]
-    return acquisition.page_leaf(unshaded, acquisition.page_mask(capture.white, capture.black))
+    if restoration.UNSHADED not in scan.images:
+        scan = with_shading_removed(scan, capture, calibration)
+    return acquisition.page_leaf(scan.images[restoration.UNSHADED], acquisition.page_mask(capture.white, capture.black))
 
 
 def with_stiffness(scan: Scan, materials: StiffnessMap) -> Scan:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from deskew.errors import StepError, require
 from deskew.restoration.registration import Registration, register
 from deskew.restoration.sampling import read_at
+from deskew.restoration.shading import UNSHADED
 from deskew.restoration.warp import texture_quads
 from deskew.types import WHITE, Array, Flattened, Pinhole, Restoration, Scan, Size
 
@@ -107,7 +108,7 @@ def restore_textures(
     Parameters
     ----------
     scan : Scan
-        The page and its images.
+        The page and its images; with an `unshaded` one, images of another format are registered to that.
     flattened : Flattened
         Its sheet, flattened.
     lights : names, optional
@@ -134,7 +135,9 @@ def restore_textures(
     # Every image of a format helps to find its map, wanted or not.
     formats = {scan.images[light].shape[1::-1] for light in wanted} - {size}
     others = {light: image for light, image in scan.images.items() if image.shape[1::-1] in formats}
-    registrations = register_textures(others, white) if registrations is None else registrations
+    if registrations is None:
+        # Shading is no part of the page: light from another side shifts what the patches compare by .2 texture pixels.
+        registrations = register_textures(others, scan.images.get(UNSHADED, white))
     plain = texture_quads(white, scan.camera, scan.sheet, flattened, scale)
     images = {}
     for light in wanted:

@@ -93,12 +93,13 @@ class Stiffness(Study):
         with record.stage("scan"):
             recipe = configured(config.scan, recipe_for(config.methods[0]))
             scan = pipeline.scan_by(recipe, capture, bench.calibration, shape=(config.mesh.rows, config.mesh.columns))
+            scan = pipeline.with_shading_removed(scan, capture, bench.calibration)
             leaf = _leaf(config, scan, capture, bench)
         trial = _Trial(record, two, truth, scan, leaf)
         trial.measure_page(capture)
         trial.restore_all(config)
         with record.attempt(f"difference/{two.case}"):
-            trial.measure_difference(capture)
+            trial.measure_difference()
         return record.outcome()
 
 
@@ -202,11 +203,11 @@ class _Trial:
             }
             self.record.add(place, method, gains)
 
-    def measure_difference(self, capture: Capture) -> None:
+    def measure_difference(self) -> None:
         """Register the photograph, texture both ends of the ratios with it, and subtract one from the other."""
         place, name = f"difference/{self.case}", _PHOTOGRAPH
         with self.record.stage("register"):
-            fit = restoration.register(capture.textures[name], capture.white, name)
+            fit = restoration.register(self.scan.images[name], self.scan.images[restoration.UNSHADED], name)
         error = map_error(fit, self.truth.texture_maps[name], self.scan.camera.size)
         figures = {"registration_error_px": error, "registration_residual_px": fit.residual_px}
         vellum, paper = self.flattened[max(self.flattened)], self.flattened[min(self.flattened)]

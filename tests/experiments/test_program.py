@@ -61,8 +61,8 @@ ROOT = Path(__file__).resolve().parents[2]
         ("engine=slurm", ("`engine`", "processes, serial", "'slurm'")),
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
         (
-            "experiment=stiffness",
-            ("`experiment`", ", ".join(sorted([*STUDIES, "fake"])), "'stiffness'"),
+            "experiment=colours",
+            ("`experiment`", ", ".join(sorted([*STUDIES, "fake"])), "'colours'"),
         ),
         ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
         ("trials", ("`trials`", "KEY=VALUE")),
