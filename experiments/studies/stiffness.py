@@ -16,6 +16,7 @@ from deskew.errors import require
 from deskew.io import StiffnessMap, read_image
 from deskew.projection import pixel_grid
 from deskew.recipes import recipe_for
+from deskew.restoration import Registration
 from deskew.types import Array, Capture, Flattened, Floats, Restoration, Scan
 from experiments.reporting import Layout
 from experiments.settings import Config
@@ -50,7 +51,8 @@ class Stiffness(Study):
     Conditions
     ----------
     `unrestored/A`, `unrestored/B`, `unrestored/N`
-        The page of a case: the vellum shrank, the sleeve grew, nothing changed its size; its scan and its materials.
+        The page of a case: the vellum shrank, the sleeve grew, nothing changed its size; its scan, its materials, and
+        the photograph registered to the scan.
     `restored/A/vellum_over_paper=0.01`, ...
         The page restored with the vellum a hundredth as stiff as the paper.
     `restored/A/free_scale`, ...
@@ -58,7 +60,7 @@ class Stiffness(Study):
     `dynamics/A/vellum_over_paper=0.01`, ...
         Restored with the right material the stiffer one by the methods after the first.
     `difference/A`, ...
-        The photograph registered to the scan, and the restorations at both ends of the ratios subtracted.
+        The photograph restored at both ends of the ratios, one subtracted from the other.
     """
 
     layout: ClassVar[Layout] = LAYOUT
@@ -99,7 +101,7 @@ class Stiffness(Study):
         trial.measure_page(capture)
         trial.restore_all(config)
         with record.attempt(f"difference/{two.case}"):
-            trial.measure_difference()
+            trial.measure_difference(trial.registered())
         return record.outcome()
 
 
@@ -203,13 +205,19 @@ class _Trial:
             }
             self.record.add(place, method, gains)
 
-    def measure_difference(self) -> None:
-        """Register the photograph, texture both ends of the ratios with it, and subtract one from the other."""
-        place, name = f"difference/{self.case}", _PHOTOGRAPH
+    def registered(self) -> Registration:
+        """Register the photograph to the scan; measured as the page's own figure."""
+        name = _PHOTOGRAPH
         with self.record.stage("register"):
             fit = restoration.register(self.scan.images[name], self.scan.images[restoration.UNSHADED], name)
         error = map_error(fit, self.truth.texture_maps[name], self.scan.camera.size)
         figures = {"registration_error_px": error, "registration_residual_px": fit.residual_px}
+        self.record.add(f"unrestored/{self.case}", "-", figures)
+        return fit
+
+    def measure_difference(self, fit: Registration) -> None:
+        """Texture both ends of the ratios with the photograph and subtract one from the other."""
+        name = _PHOTOGRAPH
         vellum, paper = self.flattened[max(self.flattened)], self.flattened[min(self.flattened)]
         with self.record.stage("difference"):
             first, second = (
@@ -218,7 +226,7 @@ class _Trial:
             )
         page = np.isfinite(first.backward_map[..., 0]) & np.isfinite(second.backward_map[..., 0])
         difference, found = metrics.image_difference(first.images[name], second.images[name], page)
-        self.record.add(place, "-", figures | found)
+        self.record.add(f"difference/{self.case}", "-", found)
         self._picture("vellum", _halved(first.images[name]))
         self._picture("paper", _halved(second.images[name]))
         self._picture("difference", _halved(np.where(page, 255.0 - _DIFFERENCE_GAIN * np.abs(difference), _DESK_GREY)))
