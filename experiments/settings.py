@@ -89,14 +89,14 @@ class SheetSettings(Checked):
     """The crumpled sheet.
 
     `kind`: mirror folds, drawn from the trial's seed; or physical crumples, of which eight are shipped.
-    `drawn`: new physical sheets from the trial's seed instead of the shipped ones; some 20 s each.
+    `drawn`: new physical sheets from the trial's seed instead of the shipped ones; some 90 s each.
     `slope_p90_deg`: of drawn sheets; the shipped ones have their own.
     `paths`: sheets with V (h, w, 3) and F (h, w, 2) in mm, used instead.
     """
 
     group: ClassVar[str] = "sheet."
     kind: str = choice("mirror", "mirror", "physical")
-    drawn: bool = False
+    drawn: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
     slope_p90_deg: float = number(20.0, 1.0, 45.0, "degrees")
     paths: list[str] = setting(
         [], "be a list of NPZ files, one a trial", lambda value: all(str(path).endswith(".npz") for path in value)
@@ -231,7 +231,7 @@ class ReadingSettings(Checked):
         "be a list of different numbers in [1, 45] degrees",
         lambda values: len(set(values)) == len(values) and all(1.0 <= value <= 45.0 for value in values),
     )
-    restore: bool = True
+    restore: bool = setting(True, "be true or false", lambda value: isinstance(value, bool))
     real_path: str | None = None
 
 
