@@ -231,7 +231,7 @@ class ReadingSettings(Checked):
         "be a list of different numbers in [1, 45] degrees",
         lambda values: len(set(values)) == len(values) and all(1.0 <= value <= 45.0 for value in values),
     )
-    restore: bool = True
+    restore: bool = setting(True, "be true or false", lambda value: isinstance(value, bool))
     real_path: str | None = None
 
 

@@ -17,6 +17,7 @@ from deskew.metrics import OcrEngine, OcrSettings
 from deskew.recipes import Recipe
 from deskew.restoration import UNSHADED
 from deskew.types import WHITE, Array, Floats, Scan
+from experiments.reporting import Layout
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
@@ -71,7 +72,7 @@ class OcrMisses(Study):
     that with its shading removed by the scanned shape and the calibrated projector.
     """
 
-    layout: ClassVar = LAYOUT
+    layout: ClassVar[Layout] = LAYOUT
 
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan a trial a page, one a page and further severity, and one a real document."""

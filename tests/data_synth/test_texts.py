@@ -30,6 +30,7 @@ def test_capitals_are_eight_of_each_in_words_of_4_to_8(seed: int) -> None:
     words = page_words(np.random.default_rng(seed))
     assert Counter("".join(words)) == dict.fromkeys(ALPHABET, 8)
     assert {len(word) for word in words} <= {4, 5, 6, 7, 8}
+    assert not any("OU" in word for word in words)
 
 
 def test_the_full_alphabet_is_6_or_7_of_each() -> None:
