@@ -26,6 +26,7 @@ from data_synth.refinement import refined
 from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
+from data_synth.texts import N_LETTERS, Text, page_words
 from data_synth.truth import Truth
 from data_synth.vellum import VellumPage
 
@@ -33,6 +34,7 @@ __all__ = [
     "BOARD",
     "KONTRON_SIZE",
     "N_CRUMPLES",
+    "N_LETTERS",
     "N_SHIPPED",
     "PAGE_SIZE_MM",
     "PAL_SIZE",
@@ -50,6 +52,7 @@ __all__ = [
     "Page",
     "Rig",
     "RigConfig",
+    "Text",
     "TrueSheet",
     "Truth",
     "TwoMaterials",
@@ -70,6 +73,7 @@ __all__ = [
     "kontron_light",
     "kontron_readout",
     "manuscript_rig",
+    "page_words",
     "photograph",
     "plane",
     "posed",

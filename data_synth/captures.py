@@ -118,7 +118,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="same seed, same bytes [%(default)s]")
     parser.add_argument("--pages", type=int, default=1, help="crumpled pages [%(default)s]")
     parser.add_argument("--poses", type=int, default=9, help="poses of the printed board [%(default)s]")
-    parser.add_argument("--slope-p90-deg", type=float, default=20.0, help="how crumpled: 1 to 35 [%(default)s]")
+    parser.add_argument("--slope-p90-deg", type=float, default=20.0, help="how crumpled: 1 to 45 [%(default)s]")
     parser.add_argument(
         "--pattern",
         choices=[str(kind) for kind in PatternKind],

@@ -74,7 +74,7 @@ def crumpled(
     page_size_mm : (width, height)
         Page [mm].
     slope_p90_deg : float
-        90th percentile of the slope, in [1, 35]; met within a degree, nearly always within .3.
+        90th percentile of the slope, in [1, 45]; met within a degree, nearly always within .3.
     n_folds : (fewest, most)
         Mirror folds, both included.
     view : View
@@ -92,7 +92,7 @@ def crumpled(
     StepError
         If 200 drawn sheets were all rejected.
     """
-    require(1 <= slope_p90_deg <= 35, "slope_p90_deg", "be in [1, 35]", slope_p90_deg)
+    require(1 <= slope_p90_deg <= 45, "slope_p90_deg", "be in [1, 45]", slope_p90_deg)
     require(1 <= n_folds[0] <= n_folds[1], "n_folds", "be (fewest, most) with 1 <= fewest <= most", n_folds)
     view = view or View()
     coarse = page_grid(page_size_mm, _COARSE_MM)

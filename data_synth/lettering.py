@@ -34,7 +34,7 @@ def pseudo_words(rng: np.random.Generator, n_words: int = 22, n_letters: int = 8
     rng : numpy Generator
         Of the order.
     n_words, n_letters : int
-        Words, and letters of each; 22 x 8 = 176 letters is the paper's page (section 4.2).
+        Words, and letters of each. Pages of the paper's experiment are drawn by :func:`data_synth.page_words`.
     """
     require(n_words >= 1 and n_letters >= 1, "n_words", "be at least 1, as the letters", (n_words, n_letters))
     needed = n_words * n_letters
@@ -86,7 +86,7 @@ def set_words(
     Parameters
     ----------
     words : sequence of str
-        Upper-case words.
+        Words of letters that the font has.
     page_size_mm : (width, height)
         Page [mm].
     capital_mm : float

@@ -37,25 +37,28 @@ _HIDDEN = {Layer.FLUORESCENCE: 0.80, Layer.TRANSMITTANCE: 0.28}
 
 @dataclass(frozen=True, slots=True)
 class Lettered:
-    """Black capitals on white paper, for reading machines (section 4.2).
+    """Black letters on white paper, for reading machines (section 4.2).
 
     Attributes
     ----------
     words : sequence of str
-        What is printed; `pseudo_words` draws the paper's 176 letters.
+        What is printed; :func:`data_synth.page_words` draws the paper's 176 letters.
     page_size_mm : (width, height)
         Page [mm].
     capital_mm : float
         Height of a capital [mm].
+    margin_mm : float
+        Free border all round [mm].
     """
 
     words: Sequence[str]
     page_size_mm: tuple[float, float] = PAGE_SIZE_MM
     capital_mm: float = 10.0
+    margin_mm: float = 16.0
     lettering: Lettering = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        lettering = set_words(self.words, self.page_size_mm, capital_mm=self.capital_mm)
+        lettering = set_words(self.words, self.page_size_mm, capital_mm=self.capital_mm, margin_mm=self.margin_mm)
         object.__setattr__(self, "lettering", lettering)
 
     @property

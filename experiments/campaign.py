@@ -54,8 +54,9 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
     study = find_study(config.experiment)
     keys = study.plan(config)
     require_targets(out, study.layout)
+    about = study.about(config)
     settings = settings_of(config, study.inputs(config))
-    identity = fingerprint(settings)
+    identity = fingerprint({**settings, **about})
     with Store(out, identity) as store:
         store.forget_lost()
         finished = store.finished()
@@ -68,7 +69,7 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
         )
     if results.rows and all(row.metric == "failed" for row in results.rows):
         raise StepError(f"{config.experiment}: no trial succeeded; the first says: {results.failures[0].reason}")
-    write_report(out, study.layout, results, provenance(config.experiment, settings, identity))
+    write_report(out, study.layout, results, {**provenance(config.experiment, settings, identity), **about})
     return Finished(out, len(keys), len(missing), len({(f.trial, f.condition, f.method) for f in results.failures}))
 
 

@@ -97,7 +97,7 @@ class SheetSettings(Checked):
     group: ClassVar[str] = "sheet."
     kind: str = choice("mirror", "mirror", "physical")
     drawn: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
-    slope_p90_deg: float = number(20.0, 1.0, 35.0, "degrees")
+    slope_p90_deg: float = number(20.0, 1.0, 45.0, "degrees")
     paths: list[str] = setting(
         [], "be a list of NPZ files, one a trial", lambda value: all(str(path).endswith(".npz") for path in value)
     )
@@ -105,10 +105,15 @@ class SheetSettings(Checked):
 
 @dataclass
 class PageSettings(Checked):
-    """What is printed on the sheet."""
+    """What is printed on the sheet.
+
+    `text`: of a lettered page in the experiment `ocr_misses`, always 176 letters: pseudo-words of the 22 capitals that
+    readers tell apart best, of all 26, or plain English in lower case.
+    """
 
     group: ClassVar[str] = "page."
-    kind: str = choice("checkerboard", "checkerboard", "lettered")
+    kind: str = choice("checkerboard", "checkerboard", "lettered", "vellum")
+    text: str = choice("capitals", "capitals", "full", "prose")
 
 
 @dataclass
@@ -209,6 +214,28 @@ class RealBoardsSettings(Checked):
 
 
 @dataclass
+class ReadingSettings(Checked):
+    """How pages are read, and which.
+
+    `engine`: never replaced by the other one. `psm`: page segmentation mode; 6 is one block of text.
+    `severities`: further 90th percentiles of slope at which pages are read.
+    `restore`: false reads unrestored pages alone and scans none, which is how a severity is chosen.
+    `real_path`: folder of photographed documents with their words; they are not part of the project.
+    """
+
+    group: ClassVar[str] = "ocr."
+    engine: str = choice("tesserocr", "tesserocr", "pytesseract")
+    psm: int = count(6, 3, 13)
+    severities: list[float] = setting(
+        [],
+        "be a list of different numbers in [1, 45] degrees",
+        lambda values: len(set(values)) == len(values) and all(1.0 <= value <= 45.0 for value in values),
+    )
+    restore: bool = setting(True, "be true or false", lambda value: isinstance(value, bool))
+    real_path: str | None = None
+
+
+@dataclass
 class SurfacesSettings(Checked):
     """The flattening of meshes that store their flat sheet.
 
@@ -243,6 +270,31 @@ class DecodersSettings(Checked):
     )
 
 
+def _ratios_to_both_sides(values: list[float]) -> bool:
+    allowed = all(isfinite(value) and 1e-4 <= value <= 1e4 for value in values)
+    return allowed and len(set(values)) == len(values) and min(values, default=1.0) < 1.0 < max(values, default=1.0)
+
+
+@dataclass
+class StiffnessSettings(Checked):
+    """The restoration of a page of two materials, a vellum leaf in a paper sleeve.
+
+    `vellum_over_paper`: ratios of stiffness under test; the least and the greatest are compared with each other.
+    `materials`: how the two are told apart, by the page's `texture`, or by a picture of the camera's size that is not
+    black where the vellum is.
+    """
+
+    group: ClassVar[str] = "stiffness."
+    vellum_over_paper: list[float] = setting(
+        [0.01, 0.1, 1.0, 10.0, 100.0],
+        "be a list of different numbers in [0.0001, 10000], some below and some above 1",
+        _ratios_to_both_sides,
+    )
+    materials: str = setting(
+        "texture", "be texture or a PNG file", lambda value: value == "texture" or value.lower().endswith(".png")
+    )
+
+
 @dataclass
 class Config(Checked):
     """The whole configuration of one run."""
@@ -265,8 +317,10 @@ class Config(Checked):
     mesh: MeshSettings = field(default_factory=MeshSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
+    ocr: ReadingSettings = field(default_factory=ReadingSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
     surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
+    stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

@@ -74,6 +74,7 @@ class Scanning:
     ink: bool | None
     denoise: bool | None
     stiffness: Path | None = None
+    unshaded: bool = False
 
     def recipe(self, pattern: PatternKind) -> Recipe:
         """Return the method's own recipe, but for what the user says."""
@@ -108,16 +109,33 @@ def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wan
     allowed = all(2 <= n <= 1000 for n in how.shape)
     require(allowed, "--shape", "be 2 to 1000 vertices down and across", f"{how.shape[0]} {how.shape[1]}")
     capture = open_capture(folder)  # before the import below: a wrong folder is then refused within the blink of an eye
-    if wanted is not None:
-        from deskew.types import WHITE
-
-        wanted.check([WHITE, *capture.textures])
+    unshaded = _unshaded(capture, how, wanted)
     mask, materials = how.page(capture.camera_size), how.materials(capture.camera_size)
     from deskew import pipeline
 
     found = pipeline.scan_by(how.recipe(capture.pattern), capture, calibration, shape=how.shape, mask=mask)
     warn(found.projector, folder.name)
+    if unshaded:
+        found = pipeline.with_shading_removed(found, capture, calibration, how.recipe(capture.pattern))
     return found if materials is None else pipeline.with_stiffness(found, materials)
+
+
+def _unshaded(capture: Capture, how: Scanning, wanted: Wanted | None) -> bool:
+    """Tell whether the light `unshaded` is to be made; refuse what the capture's lights and it cannot give."""
+    if wanted is None and not how.unshaded:
+        return False
+    from deskew.restoration import UNSHADED
+    from deskew.types import WHITE
+
+    known = [WHITE, *capture.textures]
+    asked = how.unshaded or (wanted is not None and UNSHADED in wanted.needed(known))
+    if asked:
+        free = UNSHADED not in known
+        require(free, "textures", f"leave the name {UNSHADED} to the page without shading", "a light of that name")
+        known.append(UNSHADED)
+    if wanted is not None:
+        wanted.check(known)
+    return asked
 
 
 def calibrate(
@@ -159,6 +177,10 @@ def scan(
     mask: Mask = None,
     ink: Ink = None,
     denoise: Denoise = None,
+    unshaded: Annotated[
+        bool,
+        typer.Option("--unshaded", help="Keep the light `unshaded` too: white without the projector's shading."),
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Measure the page's 3D shape: depth map and mesh, in millimetres.
@@ -171,7 +193,9 @@ def scan(
     from deskew import io, projection
 
     io.require_writable(output, (".npz", ".ply"))
-    found = scan_page(capture, io.read_calibration(calibration), Scanning(shape, mask, _METHOD, ink, denoise))
+    found = scan_page(
+        capture, io.read_calibration(calibration), Scanning(shape, mask, _METHOD, ink, denoise, unshaded=unshaded)
+    )
     if output.suffix.lower() == ".npz":
         io.write_scan(found, output)
     else:

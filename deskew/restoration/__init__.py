@@ -1,4 +1,4 @@
-"""From a flattened sheet back to pictures of the flat page (section 3.5), under every light (section 2.4)."""
+"""From a flattened sheet back to pictures of the flat page (section 3.5), under every light (section 2.4) or none."""
 
 from deskew.restoration.combine import (
     Components,
@@ -13,15 +13,18 @@ from deskew.restoration.combine import (
     require_combination,
 )
 from deskew.restoration.registration import Registration, register
+from deskew.restoration.shading import UNSHADED, divide_by_local_white, remove_shading, surface_points
 from deskew.restoration.textures import Textures, register_textures, restore_textures
 from deskew.restoration.warp import texture_quads, undistorted_view, undistortion_map, view_camera
 
 __all__ = [
+    "UNSHADED",
     "Components",
     "Registration",
     "Textures",
     "as_picture",
     "combined",
+    "divide_by_local_white",
     "lights_of",
     "maximum",
     "mean",
@@ -30,8 +33,10 @@ __all__ = [
     "ratio",
     "register",
     "register_textures",
+    "remove_shading",
     "require_combination",
     "restore_textures",
+    "surface_points",
     "texture_quads",
     "undistorted_view",
     "undistortion_map",

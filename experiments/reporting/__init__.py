@@ -4,6 +4,6 @@ Only the layout is offered here, because each worker imports it with its study; 
 the driver from its own module.
 """
 
-from experiments.reporting.layout import Column, FigurePage, Layout, Montage, Numbers, Plot, Section, Times
+from experiments.reporting.layout import Column, Curve, FigurePage, Layout, Montage, Numbers, Plot, Section, Times
 
-__all__ = ["Column", "FigurePage", "Layout", "Montage", "Numbers", "Plot", "Section", "Times"]
+__all__ = ["Column", "Curve", "FigurePage", "Layout", "Montage", "Numbers", "Plot", "Section", "Times"]

@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from deskew.errors import StepError, require
+from experiments.reporting.curves import curve_plot
 from experiments.reporting.figure_pages import figure_page, pictures_on
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.layout import Layout
@@ -48,6 +49,10 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
         figure = dot_plot(plot, results.rows)
         if figure is not None:
             files[f"figures/{plot.name}.png"] = png_bytes(figure)
+    for curve in layout.curves:
+        figure = curve_plot(curve, results.rows)
+        if figure is not None:
+            files[f"figures/{curve.name}.png"] = png_bytes(figure)
     shown = set()
     for montage in layout.montages:
         wall = picture_wall(montage, results.pictures)
@@ -66,7 +71,7 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
 
 def require_targets(out: Path, layout: Layout) -> None:
     """Raise an InputError where a report could not be written under `out`: to be asked before the trials."""
-    figures = (layout.plots, layout.montages, layout.pages)
+    figures = (layout.plots, layout.curves, layout.montages, layout.pages)
     drawn = [item.name for kind in figures for item in kind]
     names = [
         "results.csv",

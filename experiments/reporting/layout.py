@@ -62,6 +62,35 @@ class Plot:
 
 
 @dataclass(frozen=True, slots=True)
+class Curve:
+    """A figure: the mean of one metric against that of another, with its 95 % interval, a line a condition and method.
+
+    Attributes
+    ----------
+    name : str
+        Written as `figures/NAME.png`.
+    x, x_label, y, y_label : str
+        The metrics, and how their axes are called, with the unit.
+    conditions : tuple of str
+        A line each; its points are the condition and those that go on with "/" after it. A point's own rows tell where
+        it stands across, or else those of the first line.
+    bands : tuple of (text, low, high)
+        The paper's figures, drawn as bands across; in y's unit.
+    log : bool
+        Whether both axes are logarithmic; all figures are positive then.
+    """
+
+    name: str
+    x: str
+    x_label: str
+    y: str
+    y_label: str
+    conditions: tuple[str, ...]
+    bands: tuple[tuple[str, float, float], ...] = ()
+    log: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Montage:
     """A figure of pictures: a column a trial, a line a kind of picture.
 
@@ -149,15 +178,25 @@ class Section:
     title, note : str
         Heading and the sentences under it.
     conditions : tuple of str
-        A line each, in this order; one without data has none.
+        A line each, in this order; one without data has none. One that ends with "/" stands for all that go on there.
     metrics : tuple of str
         A column each, in the layout's order; one without data has none.
+    absent : str
+        What stands in the table's place if none of it has data; "" for an empty table.
     """
 
     title: str
     note: str
     conditions: tuple[str, ...]
     metrics: tuple[str, ...]
+    absent: str = ""
+
+    def rank(self, condition: str) -> int | None:
+        """Return the place of a condition from the top, None if it is none of this section's."""
+        for place, wanted in enumerate(self.conditions):
+            if condition == wanted or (wanted.endswith("/") and condition.startswith(wanted)):
+                return place
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,6 +241,8 @@ class Layout:
         Of a study of speed: what is written as `profile.md`.
     pages : tuple of FigurePage
         Printed pages of pictures and numbers.
+    curves : tuple of Curve
+        Figures of one metric against another.
     """
 
     title: str
@@ -213,3 +254,4 @@ class Layout:
     times: tuple[Times, ...] = ()
     profile: Times | None = None
     pages: tuple[FigurePage, ...] = ()
+    curves: tuple[Curve, ...] = ()

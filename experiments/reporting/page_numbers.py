@@ -128,7 +128,9 @@ def numbers_table(
                 cells.append(tuple(column.paper_figure(condition) or _NONE for column in measured))
             named = heading if method == "-" else f"{heading}\n{method}"
             groups.append(Group(named, tuple(c.heading.replace(" ", "\n") for c in measured), tuple(cells)))
-    mean = [] if page.columns else [f"mean of {len({row.trial for row in rows})}"]
+    conditions = {condition for _, condition in page.numbers.conditions}
+    n_trials = len({row.trial for row in rows if row.condition in conditions})
+    mean = [] if page.columns else [f"mean of {n_trials}"]
     below = [*mean, *(["the paper"] if with_paper else [])]
     return NumbersTable((*(heading for heading, _ in shown), *below), tuple(groups), len(below)) if groups else None
 

@@ -116,11 +116,13 @@ def _by_place(rows: Sequence[Row]) -> dict[Place, dict[str, list[float]]]:
 
 def _section(layout: Layout, section: Section, rows: Sequence[Row]) -> str:
     """Return a part of the summary: its own conditions in their order, and those of its columns that have data."""
-    order = {condition: place for place, condition in enumerate(section.conditions)}
-    places = _by_place([row for row in rows if row.condition in order])
+    ranks = {condition: section.rank(condition) for condition in {row.condition for row in rows}}
+    places = _by_place([row for row in rows if ranks[row.condition] is not None])
+    if not places and section.absent:
+        return section.absent
     measured = {metric for metrics in places.values() for metric in metrics}
     columns = [column for column in layout.columns if column.metric in measured.intersection(section.metrics)]
-    return _headlines(columns, dict(sorted(places.items(), key=lambda item: (order[item[0][0]], item[0][1]))))
+    return _headlines(columns, dict(sorted(places.items(), key=lambda item: (ranks[item[0][0]], *item[0]))))
 
 
 def _headlines(columns: Sequence[Column], places: Mapping[Place, Mapping[str, Sequence[float]]]) -> str:

@@ -40,6 +40,10 @@ class Study(ABC):
         """Return the files and folders that the trials read, by dotted key; the config hash covers their content."""
         return {}
 
+    def about(self, config: Config) -> Mapping[str, Any]:
+        """Return what rows depend on besides settings and sources, such as another program, for `run.json`."""
+        return {}
+
     def prepare(self, config: Config) -> Any:
         """Do once what all trials share, such as the calibration; the result is pickled to the workers."""
         return None

@@ -16,7 +16,7 @@ from experiments.trials.schema import TrialKey
 # What is ablated stands in the trial's own key.
 _NO_PART_OF_A_ROW = ("engine", "out", "budget", "trials", "trials_at", "ablations")
 # Keys that belong to one experiment only.
-_SECTIONS = ("real_boards", "surfaces")
+_SECTIONS = {"real_boards": "real_boards", "stiffness": "stiffness", "surfaces": "surfaces", "ocr": "ocr_misses"}
 # Sources that rows come from; reporting and the program around it change no row.
 SOURCES = (
     "deskew",
@@ -44,14 +44,22 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
         The files and folders that the study reads.
     """
     settings = {name: value for name, value in asdict(config).items() if name not in _NO_PART_OF_A_ROW}
-    for section in _SECTIONS:
-        if section != config.experiment:
+    for section, experiment in _SECTIONS.items():
+        if experiment != config.experiment:
             settings.pop(section)
     settings["method"] = config.methods
     for key, path in inputs.items():
         settings[f"sha256 of {key}"] = content_digest(sorted(path.rglob("*")) if path.is_dir() else [path], path)
-    # The kinds of surfaces, as what is ablated, stand in the trial's own key.
-    for group, key in (("real_boards", "path"), ("sheet", "paths"), ("surfaces", "paths"), ("surfaces", "kinds")):
+    # The kinds of surfaces and further severities, as what is ablated, stand in the trial's own key.
+    for group, key in (
+        ("real_boards", "path"),
+        ("sheet", "paths"),
+        ("stiffness", "materials"),
+        ("surfaces", "paths"),
+        ("surfaces", "kinds"),
+        ("ocr", "real_path"),
+        ("ocr", "severities"),
+    ):
         settings.get(group, {}).pop(key, None)
     return settings
 

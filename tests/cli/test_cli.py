@@ -93,8 +93,14 @@ class StandIn:
         self._step("stiffness", materials=materials)
         return scan
 
-    def restore_lights(self, scan: Scan, *, method: str, lights: Sequence[str], scale: float) -> Textures:
-        self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale)
+    def with_shading_removed(self, scan: Scan, page: Capture, calibration: Calibration, recipe: Recipe) -> Scan:
+        self._step("unshade", calibration=calibration, recipe=recipe)
+        return replace(scan, images={**scan.images, "unshaded": page.white - page.black})
+
+    def restore_lights(
+        self, scan: Scan, *, method: str, lights: Sequence[str], scale: float, **settings: object
+    ) -> Textures:
+        self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale, settings=settings)
         remedy = "" if self.status is Status.AT_REST else "push harder"
         flattened = Flattened(
             scan.sheet.vertices, self.status, remedy, {"steps": 7, "spring_energy": np.float64("nan")}
@@ -223,6 +229,23 @@ def test_a_stiffness_map_is_taken_when_asked_for(
     assert not steps.calls
 
 
+@pytest.mark.parametrize("start", ["run page -c c.json", "restore scan.npz"])
+def test_a_free_scale_is_the_methods_setting_and_needs_a_map(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], start: str
+) -> None:
+    (here / "mask.toml").write_text("[stiffness]\n255 = 3.5\n")
+    assert run(f"{start} -o out/r.png --stiffness mask.png", capsys)[0] == 0
+    assert steps.calls["restore"]["settings"] == {}
+    assert run(f"{start} -o out/r.png --stiffness mask.png --free-scale", capsys)[0] == 0
+    assert steps.calls["restore"]["settings"] == {"free_scale": True}
+    steps.calls.clear()
+    wanted = "deskew: `--free-scale` must come with --stiffness, a map of two materials, got none.\n"
+    assert run(f"{start} -o out/r.png --free-scale", capsys) == (2, "", wanted)
+    wanted = "deskew: `--free-scale` must be left out, since only the method spring finds a scale, got paper_rk4.\n"
+    assert run(f"{start} -o out/r.png -m paper_rk4 --stiffness mask.png --free-scale", capsys) == (2, "", wanted)
+    assert not steps.calls
+
+
 def test_a_map_of_another_size_is_refused_before_the_scan(
     here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -248,6 +271,23 @@ def test_every_light_and_combination_is_written_on_request(
     assert json.loads(out)["restored"] == [f"out/{name}" for name in names]
     assert sorted(path.name for path in (here / "out").iterdir()) == sorted(names)
     assert np.array_equal(io.read_image(here / "out" / "r-uv.png"), uv)
+
+
+def test_the_projectors_shading_is_removed_when_asked_for(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
+) -> None:
+    even = (capture().white - capture().black)[::-1]
+    assert run("run page -c c.json -o out/plain.png --combine mean", capsys)[0] == 0
+    assert "unshade" not in steps.calls
+    assert run("run page -c c.json -o out/r.png --light unshaded", capsys)[0] == 0
+    assert np.array_equal(io.read_image(here / "out" / "r.png"), even)
+    assert run("run page -c c.json -o out/q.png --combine ratio:unshaded/white", capsys)[0] == 0
+    assert steps.calls["restore"]["lights"] == ["unshaded", "white"]
+    assert run("scan page -c c.json -o out/s.npz --unshaded", capsys)[0] == 0
+    assert run("restore out/s.npz -o out/t.png --light unshaded", capsys)[0] == 0
+    assert np.array_equal(io.read_image(here / "out" / "t.png"), even)
+    code, _, err = run("restore scan.npz -o out/u.png --light unshaded", capsys)
+    assert (code, err) == (2, "deskew: `--light` must be one of white, uv, got unshaded.\n")
 
 
 def test_combinations_alone_are_made_of_all_lights(

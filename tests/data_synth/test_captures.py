@@ -49,8 +49,8 @@ def test_an_example_reads_back_as_what_the_rig_photographs(tmp_path: Path, rig: 
         ({"seed": -1}, "`seed` must be at least 0, got -1"),
         ({"n_pages": 0}, r"`n_pages` must be in \[1, 100\], got 0"),
         ({"n_poses": 2}, r"`n` must be in \[3, 12\], got 2"),
-        ({"slope_p90_deg": 60.0}, r"`slope_p90_deg` must be in \[1, 35\], got 60"),
-        ({"slope_p90_deg": float("nan")}, r"`slope_p90_deg` must be in \[1, 35\], got nan"),
+        ({"slope_p90_deg": 60.0}, r"`slope_p90_deg` must be in \[1, 45\], got 60"),
+        ({"slope_p90_deg": float("nan")}, r"`slope_p90_deg` must be in \[1, 45\], got nan"),
     ],
     ids=["seed", "pages", "poses", "slope", "slope NaN"],
 )

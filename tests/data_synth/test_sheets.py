@@ -195,7 +195,7 @@ def test_the_flat_sheet_is_centred_with_v_running_down() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: ds.crumpled(np.random.default_rng(0), slope_p90_deg=60.0), r"`slope_p90_deg` must be in \[1, 35\]"),
+        (lambda: ds.crumpled(np.random.default_rng(0), slope_p90_deg=60.0), r"`slope_p90_deg` must be in \[1, 45\]"),
         (lambda: ds.crumpled(np.random.default_rng(0), slope_p90_deg=np.nan), r"`slope_p90_deg` must .* got nan\."),
         (lambda: ds.crumpled(np.random.default_rng(0), n_folds=(5, 4)), r"`n_folds` must be .* got \(5, 4\)\."),
         (lambda: ds.plane(tilt_deg=50.0), r"`tilt_deg` must be in \[0, 45\], got 50\.0\."),

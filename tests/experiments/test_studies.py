@@ -103,7 +103,7 @@ def test_every_study_documents_its_conditions(name: str) -> None:
         (["experiment=corner_distance", "method=magic"], ("method", "magic")),
         (["experiment=corner_distance", "sheet.paths=[a.npz]", "trials=2"], ("`trials`", "at most 1", "got 2")),
         (["experiment=corner_distance", "sheet.paths=[no.npz]", "trials=1"], ("no.npz",)),
-        (["experiment=corner_distance", "sheet.slope_p90_deg=50"], ("`sheet.slope_p90_deg`", "[1, 35]", "50")),
+        (["experiment=corner_distance", "sheet.slope_p90_deg=50"], ("`sheet.slope_p90_deg`", "[1, 45]", "50")),
         (["experiment=corner_distance", "sheet.kind=crumpled"], ("`sheet.kind`", "mirror, physical", "crumpled")),
         (
             ["experiment=corner_distance", "sheet.paths=[a.npz]", "trials=1", "sheet.drawn=true"],
