@@ -551,7 +551,7 @@ def test_the_module_ends_with_the_exit_code() -> None:
 def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
     program = (
         "import sys; from deskew.cli import main, printing, restoring\n"
-        "def restore(found, method, wanted, as_json):\n"
+        "def restore(found, method, wanted, as_json, settings):\n"
         "    wanted.output.touch(); printing.report({}, as_json, wanted.output)\n"
         "restoring.restore_page = restore\n"
         "sys.exit(main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
