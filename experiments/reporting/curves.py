@@ -78,5 +78,5 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
     axes.legend(loc="best" if curve.log else "upper left", frameon=False, fontsize=8)
     numbers = sorted({point.y.n for points in lines.values() for point in points})
     pages = f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
-    axes.set_title(f"means of {pages} trials with their 95 % bootstrap intervals", fontsize=9)
+    axes.set_title(f"means with their 95 % bootstrap intervals; trials a point: {pages}", fontsize=9)
     return figure
