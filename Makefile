@@ -3,15 +3,17 @@
 # Which Python makes .venv; empty: python3, or whichever of 3.11 to 3.13 is there.
 PYTHON ?=
 BUDGET ?= paper
-# Folder of the real captures (README says where to get them); without it `real_boards` says that they are absent.
+# Folders of the real captures and of the real pages (README says where to get them); without them `real_boards` and the
+# real part of `ocr_misses` say that they are absent.
 REAL_BOARDS ?=
+REAL_PAGES ?=
 # Test processes at once, each with one thread.
 JOBS ?= 2
 
 BIN := .venv/bin
 STAMP := .venv/.complete
 SOURCES := deskew data_synth experiments tests
-EXPERIMENTS := plane_accuracy corner_distance surfaces surfaces_noisy real_boards
+EXPERIMENTS := plane_accuracy corner_distance corner_distance_physical ocr_misses stiffness surfaces surfaces_noisy real_boards
 # Beyond the paper; they take as long again, so only the largest budget runs them.
 EXPERIMENTS += $(if $(filter full,$(BUDGET)),decoders textures ablations)
 
@@ -35,9 +37,11 @@ reproduce: $(EXPERIMENTS) ## run every experiment and regenerate reports/ (BUDGE
 .NOTPARALLEL:
 
 $(EXPERIMENTS): $(STAMP)
-	@$(BIN)/python -m experiments experiment=$(@:_noisy=) budget=$(BUDGET) out=$(REPORTS)/$@ \
+	@$(BIN)/python -m experiments experiment=$(patsubst %_physical,%,$(@:_noisy=)) budget=$(BUDGET) out=$(REPORTS)/$@ \
 		$(if $(filter %_noisy,$@),surfaces.noise_mm=0.3) \
-		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)'))
+		$(if $(filter %_physical,$@),sheet=physical $(if $(filter smoke,$(BUDGET)),,trials=8)) \
+		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)')) \
+		$(if $(filter ocr_misses,$@),$(if $(REAL_PAGES),ocr.real_path='$(REAL_PAGES)'))
 
 bench: $(STAMP) ## time every stage against a memory triad; writes out/speed/ (TRIALS=15 repeats more)
 	@rm -rf out/speed

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from io import BytesIO
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.patches import PathPatch
 from matplotlib.textpath import TextPath, text_to_path
 from matplotlib.transforms import Affine2D
-from numba import njit
 
+from data_synth.drawing import drawn, integral_of, mean_over
 from data_synth.sheets import PAGE_SIZE_MM
 from deskew.errors import require
 from deskew.types import Floats
@@ -23,9 +20,6 @@ from deskew.types import Floats
 ALPHABET = "ABCDEFGHKLMNOPRSTUWXYZ"
 """22 letters: A to Z without I, J, Q and V, which readers of single characters confuse."""
 
-CELLS_PER_MM = 8
-_DRAWN_PER_MM = 16
-_MM_PER_INCH = 25.4
 # Height of DejaVu Sans's capitals over its size.
 _CAPITAL = 0.729
 # Free line between two lines of capitals, and a word's distance from the next, as shares of a capital's height.
@@ -77,31 +71,7 @@ class Lettering:
 
     def coverage(self, u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
         """Share of footprints of sides `du` x `dv` [mm] centred on (u, v) [mm] that is covered: (N,), in [0, 1]."""
-        planes = (np.ascontiguousarray(values, dtype=np.float64).ravel() for values in (u, v, du, dv))
-        return np.asarray(_mean_coverage(self.integral, *planes))
-
-
-@njit(cache=True)
-def _covered(integral: Floats, u: float, v: float) -> float:
-    """Area from the corner to page point (u, v) [mm] that is covered, by bilinear interpolation [cells]."""
-    rows, columns = integral.shape
-    x, y = min(max(u * CELLS_PER_MM, 0.0), columns - 1.0), min(max(v * CELLS_PER_MM, 0.0), rows - 1.0)
-    c, r = min(int(x), columns - 2), min(int(y), rows - 2)
-    a, b = x - c, y - r
-    upper = (1 - a) * integral[r, c] + a * integral[r, c + 1]
-    return float((1 - b) * upper + b * ((1 - a) * integral[r + 1, c] + a * integral[r + 1, c + 1]))
-
-
-@njit(cache=True)
-def _mean_coverage(integral: Floats, u: Floats, v: Floats, du: Floats, dv: Floats) -> Floats:
-    """Covered share of each footprint, (N,)."""
-    share = np.empty(len(u))
-    for i in range(len(u)):
-        a, b = max(du[i], 1e-3) / 2, max(dv[i], 1e-3) / 2
-        right = _covered(integral, u[i] + a, v[i] + b) - _covered(integral, u[i] + a, v[i] - b)
-        left = _covered(integral, u[i] - a, v[i] + b) - _covered(integral, u[i] - a, v[i] - b)
-        share[i] = min(max((right - left) / (4 * a * b * CELLS_PER_MM**2), 0.0), 1.0)
-    return share
+        return mean_over(self.integral, u, v, du, dv)
 
 
 def set_words(
@@ -182,24 +152,6 @@ def _integral(
     letters: Sequence[tuple[str, float, float, float]], capital_mm: float, page_size_mm: tuple[float, float]
 ) -> Floats:
     """Draw letters with their baselines' starts at (u, v) and integrate what they cover."""
-    width, height = (int(np.ceil(extent * CELLS_PER_MM)) for extent in page_size_mm)
-    fine = _DRAWN_PER_MM // CELLS_PER_MM
-    drawn_mm = width / CELLS_PER_MM, height / CELLS_PER_MM
-    inches = drawn_mm[0] / _MM_PER_INCH, drawn_mm[1] / _MM_PER_INCH
-    figure = Figure(figsize=inches, dpi=_DRAWN_PER_MM * _MM_PER_INCH)
-    FigureCanvasAgg(figure)
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.set(xlim=(0, drawn_mm[0]), ylim=(-drawn_mm[1], 0))
-    axes.axis("off")
     outlines = {c: TextPath((0, 0), c, size=capital_mm / _CAPITAL, prop=_FONT) for c, *_ in letters}
-    for letter, u, v, _ in letters:
-        moved = outlines[letter].transformed(Affine2D().translate(u, -v))
-        axes.add_patch(PathPatch(moved, facecolor="black", linewidth=0))
-    drawn = BytesIO()
-    figure.savefig(drawn, format="rgba", dpi="figure")
-    pixels = np.frombuffer(drawn.getvalue(), dtype=np.uint8).reshape(height * fine, width * fine, 4)
-    ink = 1.0 - pixels[..., 0] / 255.0
-    cells = ink.reshape(height, fine, width, fine).mean(axis=(1, 3))
-    integral = np.zeros((height + 1, width + 1))
-    integral[1:, 1:] = cells.cumsum(axis=0).cumsum(axis=1)
-    return integral
+    moved = (outlines[letter].transformed(Affine2D().translate(u, -v)) for letter, u, v, _ in letters)
+    return integral_of(drawn((PathPatch(path, facecolor="black", linewidth=0) for path in moved), page_size_mm))

@@ -10,20 +10,19 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline
 from threadpoolctl import threadpool_limits
 
 from data_synth.developables import SHAPE
-from data_synth.folds import best_rotation
-from data_synth.plate import Plate, unbent
+from data_synth.plate import Plate
+from data_synth.plate_grids import Handles, flat_plate, free_plate, levelled
 from data_synth.relaxation import relax, relax_plastically
-from data_synth.sheets import LEAST_CELL, PAGE_SIZE_MM, TrueSheet, laid, least_cell, page_grid_of, slopes_deg, to_world
+from data_synth.sheets import LEAST_CELL, PAGE_SIZE_MM, TrueSheet, laid, least_cell, page_grid_of, slopes_deg
+from data_synth.splines import resampled, spline
 from deskew.errors import StepError, require, require_positive, require_whole
 from deskew.types import Floats
 
 _LEVELS = ((61, 79), (121, 156))  # (short side, long side); the grid asked for comes last
 _ATTEMPTS = 5
-_LEAST_THICKNESS = 0.06  # of the spacing: a ridge narrower than a cell would cling to the grid
 # Slope that is left when the sheet is let go, over that under load: it is less if creases formed on the coarsest grid
 # alone, since the next one sharpens them without yielding.
 _SPRING_BACK, _SPRING_BACK_COARSE = 0.85, 0.74
@@ -56,22 +55,6 @@ class Paper:
         fewest, most = self.handles
         require_whole("handles", fewest, 1, 1000)
         require_whole("handles", most, fewest, 1000)
-
-
-@dataclass(frozen=True, slots=True)
-class _Handles:
-    """Where the sheet is pulled: places (k, 2) as shares of the (long, short) side, heights (k,) in [-1, 1]."""
-
-    places: Floats
-    heights: Floats
-    pull: float
-
-    def on(self, shape: tuple[int, int], amplitude_mm: float) -> tuple[Floats, Floats]:
-        """Stiffness and height of the spring at each vertex of a grid: two (n, m) arrays."""
-        pull, heights = np.zeros(shape), np.zeros(shape)
-        at = tuple(np.round(self.places * (np.array(shape) - 1)).astype(int).T)
-        pull[at], heights[at] = self.pull, amplitude_mm * self.heights
-        return pull, heights
 
 
 def physical(
@@ -117,7 +100,7 @@ def physical(
     for _ in range(_ATTEMPTS):
         with threadpool_limits(1, user_api="blas"):  # the sums' order, and so the bytes, depend on the threads
             x = _crumpled(rng, last, sizes, slope_p90_deg, paper or Paper())
-        vertices = _levelled(np.swapaxes(x, 0, 1) if turned else x, page_size_mm, turned)
+        vertices = levelled(np.swapaxes(x, 0, 1) if turned else x, page_size_mm, turned)
         if least_cell(vertices) >= LEAST_CELL:
             return TrueSheet(laid(vertices), page_grid_of(shape, page_size_mm))
     raise StepError(f"physical: {_ATTEMPTS} sheets had walls; lower `slope_p90_deg`.")
@@ -128,43 +111,28 @@ def _crumpled(
 ) -> Floats:
     """Crumple on grids from coarse to fine, let go on the last but one: (n, m, 3), the longer side first."""
     n = int(rng.integers(paper.handles[0], paper.handles[1] + 1))
-    handles = _Handles(rng.uniform(0.05, 0.95, (n, 2)), rng.uniform(-1.0, 1.0, n), paper.pull)
+    handles = Handles(rng.uniform(0.05, 0.95, (n, 2)), rng.uniform(-1.0, 1.0, n), paper.pull)
     levels = [(n, m) for m, n in _LEVELS if n < last[0] and m < last[1]] or [last]
-    x = _flat(levels[0], sizes)
+    x = flat_plate(levels[0], sizes)
     amplitude = 0.25
     loaded = slope_p90_deg / (_SPRING_BACK_COARSE if len(levels) == 1 and levels != [last] else _SPRING_BACK)
     for level in levels:
         # The last of these levels does the last of the pulling, so that its creases form on the way.
         share = 1.0 if level == levels[-1] else 0.9
-        x = _resampled(x, level)
-        plate = _plate(level, sizes, paper, unbent(level))  # creases form anew, sharper
+        x = resampled(x, level)
+        plate = free_plate(level, sizes, paper.thickness_mm)  # creases form anew, sharper
         x, plate, amplitude = _pulled(x, plate, handles, amplitude, share * loaded, paper)
     x = relax(x, replace(plate, pull=np.zeros(plate.pull.shape)), 12)
     if levels[-1] == last:
         return x
-    along, across, twist = plate.rest  # the cells' centres are stretched to the border, by half a cell at most
-    rest = (_linear(along, last), _linear(across, last), _linear(twist, (last[0] - 1, last[1] - 1)))
-    return relax(_resampled(x, last), _plate(last, sizes, paper, rest), 8)
-
-
-def _flat(shape: tuple[int, int], sizes: tuple[float, float]) -> Floats:
-    """Return the flat page centred over the origin: (n, m, 3) [mm]."""
-    x, y = (np.linspace(-size / 2, size / 2, n) for size, n in zip(sizes, shape, strict=True))
-    return np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros(shape)], axis=-1)
-
-
-def _plate(
-    shape: tuple[int, int], sizes: tuple[float, float], paper: Paper, rest: tuple[Floats, Floats, Floats]
-) -> Plate:
-    """Return a free sheet on a grid of `shape`."""
-    spacing = (sizes[0] / (shape[0] - 1), sizes[1] / (shape[1] - 1))
-    return Plate(
-        spacing, max(paper.thickness_mm, _LEAST_THICKNESS * max(spacing)), rest, np.zeros(shape), np.zeros(shape)
-    )
+    along, across, twist = plate.rest
+    # Linear, since a cubic would overshoot at creases. The cells' centres are stretched to the border, by half a cell.
+    rest = (spline(along, last, 1), spline(across, last, 1), spline(twist, (last[0] - 1, last[1] - 1), 1))
+    return relax(resampled(x, last), replace(free_plate(last, sizes, paper.thickness_mm), rest=rest), 8)
 
 
 def _pulled(
-    x: Floats, plate: Plate, handles: _Handles, amplitude_mm: float, slope_p90_deg: float, paper: Paper
+    x: Floats, plate: Plate, handles: Handles, amplitude_mm: float, slope_p90_deg: float, paper: Paper
 ) -> tuple[Floats, Plate, float]:
     """Pull the handles farther apart, creasing all the while, until the sheet's slope under load is the wanted one."""
     shape = (x.shape[0], x.shape[1])
@@ -182,31 +150,3 @@ def _slopes_deg(x: Floats) -> Floats:
     """Slopes of a grid, whichever way it is wound [deg]."""
     slopes = slopes_deg(x)
     return np.asarray(np.minimum(slopes, 180.0 - slopes))
-
-
-def _resampled(x: Floats, shape: tuple[int, int]) -> Floats:
-    """Sample a grid (n, m, 3) at another density by bicubic splines."""
-    return np.stack([_spline(x[..., c], shape, 3) for c in range(3)], axis=-1)
-
-
-def _linear(field: Floats, shape: tuple[int, int]) -> Floats:
-    return _spline(field, shape, 1)  # a cubic would overshoot at creases
-
-
-def _spline(field: Floats, shape: tuple[int, int], degree: int) -> Floats:
-    if field.shape == shape:
-        return field
-    here = [np.linspace(0.0, 1.0, n) for n in field.shape]
-    there = [np.linspace(0.0, 1.0, n) for n in shape]
-    return np.asarray(RectBivariateSpline(*here, field, kx=degree, ky=degree, s=0)(*there))
-
-
-def _levelled(vertices: Floats, page_size_mm: tuple[float, float], turned: bool) -> Floats:
-    """Turn a sheet (rows, columns, 3) as it best fits the page lying flat on the bed."""
-    target = to_world(page_grid_of((vertices.shape[0], vertices.shape[1]), page_size_mm), page_size_mm).reshape(-1, 3)
-    # In here v rises where the page's Y falls, and a turned grid has its axes swapped: both are undone by signs.
-    points = vertices.reshape(-1, 3).copy()
-    points = points if turned else points[:, [1, 0, 2]]
-    points[:, 1] *= -1
-    R = best_rotation(points - points.mean(axis=0), target)
-    return np.asarray(np.einsum("kj,ij->ki", points, R)).reshape(vertices.shape)

@@ -30,6 +30,9 @@ class Plate:
         Stiffness of the spring that holds each vertex at a height; 0 where free.
     heights : (n, m) array
         Those heights [mm].
+    growth : (n - 1, m - 1) array
+        Lengths that each cell wants over those of the grid: the membrane's rest metric, 1 where nothing changed size.
+        Where it varies the sheet fits no plane, and buckles (Klein, Efrati, Sharon, Science 315, 2007).
     """
 
     spacing_mm: tuple[float, float]
@@ -37,6 +40,7 @@ class Plate:
     rest: tuple[Floats, Floats, Floats]
     pull: Floats
     heights: Floats
+    growth: Floats
 
     @property
     def bending(self) -> float:
@@ -48,6 +52,11 @@ def unbent(shape: tuple[int, int]) -> tuple[Floats, Floats, Floats]:
     """Rest curvature of a page that never yielded."""
     n, m = shape
     return np.zeros((n, m)), np.zeros((n, m)), np.zeros((n - 1, m - 1))
+
+
+def unchanged(shape: tuple[int, int]) -> Floats:
+    """Growth of a page whose every cell kept its size."""
+    return np.ones((shape[0] - 1, shape[1] - 1))
 
 
 def normals(x: Floats) -> tuple[Floats, Floats]:
@@ -102,7 +111,9 @@ def energy(x: Floats, plate: Plate, at: tuple[Floats, Floats] | None = None) -> 
     """Energy of a sheet (n, m, 3) [mm^2]; rest curvatures act along the normals `at`, by default its own."""
     a, b = plate.spacing_mm
     vertex, cell = normals(x) if at is None else at
-    return float(total_energy(x, a, b, plate.bending, *plate.rest, vertex, cell, plate.pull, plate.heights))
+    return float(
+        total_energy(x, a, b, plate.bending, *plate.rest, vertex, cell, plate.pull, plate.heights, plate.growth)
+    )
 
 
 def derivatives(x: Floats, plate: Plate, at: tuple[Floats, Floats], band: Floats) -> Floats:
@@ -126,7 +137,7 @@ def derivatives(x: Floats, plate: Plate, at: tuple[Floats, Floats], band: Floats
     gradient = np.zeros(x.size)
     band[:] = 0.0
     a, b = plate.spacing_mm
-    add_membrane(x, a, b, gradient, band)
+    add_membrane(x, a, b, plate.growth, gradient, band)
     add_bending(x, a, b, plate.bending, *plate.rest, *at, gradient, band)
     add_pull(x, plate.pull, plate.heights, gradient, band)
     return gradient

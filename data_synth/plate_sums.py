@@ -58,6 +58,7 @@ def total_energy(
     at_cell: Floats,
     pull: Floats,
     heights: Floats,
+    growth: Floats,
 ) -> float:
     """Sum the energies of membrane, plate and handles [mm^2]; the arguments are those of `data_synth.plate.Plate`."""
     n, m = x.shape[:2]
@@ -78,25 +79,26 @@ def total_energy(
                     k -= twist[p, q] * at_cell[p, q, c]
                     total += bending * a * b * k * k
             if p < n - 1 and q < m - 1:
+                long, wide = growth[p, q] * a, growth[p, q] * b
                 for corner in range(4):
                     i, j = _CORNERS[corner, 0], _CORNERS[corner, 1]
                     e0 = x[p + 1, q + j] - x[p, q + j]
                     e1 = x[p + i, q + 1] - x[p + i, q]
-                    total += 0.25 * a * b * _stress(e0, e1, a, b)[3]
+                    total += 0.25 * long * wide * _stress(e0, e1, long, wide)[3]
     return total
 
 
 @njit(cache=True)
-def add_membrane(x: Floats, a: float, b: float, gradient: Floats, band: Floats) -> None:
-    """Add the membrane's gradient and Hessian."""
+def add_membrane(x: Floats, a: float, b: float, growth: Floats, gradient: Floats, band: Floats) -> None:
+    """Add the membrane's gradient and Hessian; a cell's rest lengths are its growth times a and b."""
     n, m = x.shape[:2]
     e0, e1 = np.empty(3), np.empty(3)
     K = np.empty((6, 6))
     f = np.empty(6)
     at = np.empty(4, dtype=np.int64)
-    weight = 0.25 * a * b
     for p in range(n - 1):
         for q in range(m - 1):
+            long, wide = growth[p, q] * a, growth[p, q] * b
             for corner in range(4):
                 i, j = _CORNERS[corner, 0], _CORNERS[corner, 1]
                 # e0 = x[at[1]] - x[at[0]], e1 = x[at[3]] - x[at[2]]
@@ -105,7 +107,7 @@ def add_membrane(x: Floats, a: float, b: float, gradient: Floats, band: Floats) 
                 for c in range(3):
                     e0[c] = x[p + 1, q + j, c] - x[p, q + j, c]
                     e1[c] = x[p + i, q + 1, c] - x[p + i, q, c]
-                _element(e0, e1, a, b, weight, f, K)
+                _element(e0, e1, long, wide, 0.25 * long * wide, f, K)
                 _scatter(f, K, at, gradient, band)
 
 

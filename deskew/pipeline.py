@@ -13,7 +13,7 @@ from deskew.acquisition import DecoderSettings, DenoiseSettings, DepthSettings, 
 from deskew.errors import StepError, require
 from deskew.io import StiffnessMap
 from deskew.projection import project
-from deskew.recipes import Recipe
+from deskew.recipes import BEST, Recipe
 from deskew.restoration import Textures
 from deskew.types import (
     WHITE,
@@ -28,6 +28,9 @@ from deskew.types import (
     Scan,
     Status,
 )
+
+# Smoothing of a surface's normals, for an unfiltered and for a filtered depth map.
+_NORMALS_PX = {False: 2.0, True: 0.6}
 
 
 def decoder_for(recipe: Recipe, pattern: PatternKind) -> DecoderSettings | None:
@@ -181,7 +184,7 @@ def span(
     )
 
 
-def with_shading_removed(scan: Scan, capture: Capture, calibration: Calibration) -> Scan:
+def with_shading_removed(scan: Scan, capture: Capture, calibration: Calibration, recipe: Recipe = BEST) -> Scan:
     """Add the image `unshaded` to a scan: its white image without the projector's shading, which its shape tells.
 
     Parameters
@@ -192,11 +195,40 @@ def with_shading_removed(scan: Scan, capture: Capture, calibration: Calibration)
         It was scanned from this one.
     calibration : Calibration
         Of the same devices; the place and direction of the projector count.
+    recipe : Recipe
+        How it was scanned: normals of an unfiltered depth map are smoothed more.
     """
     points = restoration.surface_points(scan.depth)
     devices = calibration.camera, calibration.projector
-    unshaded = restoration.remove_shading(capture.white, capture.black, *devices, points)
+    unshaded = restoration.remove_shading(capture.white, capture.black, *devices, points, _NORMALS_PX[recipe.denoise])
     return replace(scan, images={**scan.images, restoration.UNSHADED: unshaded})
+
+
+def find_leaf(scan: Scan, capture: Capture, calibration: Calibration) -> npt.NDArray[np.bool_]:
+    """Tell where a page is of a second, darker material, a leaf set in a sleeve, by the page's own texture.
+
+    Parameters
+    ----------
+    scan : Scan
+        The page, whose shape takes the shading out of its picture.
+    capture : Capture
+        It was scanned from this one.
+    calibration : Calibration
+        Of the same devices.
+
+    Returns
+    -------
+    (height, width) bool array
+        The leaf in raw pixels; a `StiffnessMap` gives both materials their constants.
+
+    Raises
+    ------
+    StepError
+        If the page does not show two materials.
+    """
+    if restoration.UNSHADED not in scan.images:
+        scan = with_shading_removed(scan, capture, calibration)
+    return acquisition.page_leaf(scan.images[restoration.UNSHADED], acquisition.page_mask(capture.white, capture.black))
 
 
 def with_stiffness(scan: Scan, materials: StiffnessMap) -> Scan:

@@ -89,14 +89,14 @@ class SheetSettings(Checked):
     """The crumpled sheet.
 
     `kind`: mirror folds, drawn from the trial's seed; or physical crumples, of which eight are shipped.
-    `drawn`: new physical sheets from the trial's seed instead of the shipped ones; some 20 s each.
+    `drawn`: new physical sheets from the trial's seed instead of the shipped ones; some 90 s each.
     `slope_p90_deg`: of drawn sheets; the shipped ones have their own.
     `paths`: sheets with V (h, w, 3) and F (h, w, 2) in mm, used instead.
     """
 
     group: ClassVar[str] = "sheet."
     kind: str = choice("mirror", "mirror", "physical")
-    drawn: bool = False
+    drawn: bool = setting(False, "be true or false", lambda value: isinstance(value, bool))
     slope_p90_deg: float = number(20.0, 1.0, 45.0, "degrees")
     paths: list[str] = setting(
         [], "be a list of NPZ files, one a trial", lambda value: all(str(path).endswith(".npz") for path in value)
@@ -112,7 +112,7 @@ class PageSettings(Checked):
     """
 
     group: ClassVar[str] = "page."
-    kind: str = choice("checkerboard", "checkerboard", "lettered")
+    kind: str = choice("checkerboard", "checkerboard", "lettered", "vellum")
     text: str = choice("capitals", "capitals", "full", "prose")
 
 
@@ -231,7 +231,7 @@ class ReadingSettings(Checked):
         "be a list of different numbers in [1, 45] degrees",
         lambda values: len(set(values)) == len(values) and all(1.0 <= value <= 45.0 for value in values),
     )
-    restore: bool = True
+    restore: bool = setting(True, "be true or false", lambda value: isinstance(value, bool))
     real_path: str | None = None
 
 
@@ -307,6 +307,31 @@ class DecodersSettings(Checked):
     )
 
 
+def _ratios_to_both_sides(values: list[float]) -> bool:
+    allowed = all(isfinite(value) and 1e-4 <= value <= 1e4 for value in values)
+    return allowed and len(set(values)) == len(values) and min(values, default=1.0) < 1.0 < max(values, default=1.0)
+
+
+@dataclass
+class StiffnessSettings(Checked):
+    """The restoration of a page of two materials, a vellum leaf in a paper sleeve.
+
+    `vellum_over_paper`: ratios of stiffness under test; the least and the greatest are compared with each other.
+    `materials`: how the two are told apart, by the page's `texture`, or by a picture of the camera's size that is not
+    black where the vellum is.
+    """
+
+    group: ClassVar[str] = "stiffness."
+    vellum_over_paper: list[float] = setting(
+        [0.01, 0.1, 1.0, 10.0, 100.0],
+        "be a list of different numbers in [0.0001, 10000], some below and some above 1",
+        _ratios_to_both_sides,
+    )
+    materials: str = setting(
+        "texture", "be texture or a PNG file", lambda value: value == "texture" or value.lower().endswith(".png")
+    )
+
+
 @dataclass
 class Config(Checked):
     """The whole configuration of one run."""
@@ -333,6 +358,7 @@ class Config(Checked):
     ocr: ReadingSettings = field(default_factory=ReadingSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
     surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
+    stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)
 
     def __post_init__(self) -> None:
         Checked.__post_init__(self)

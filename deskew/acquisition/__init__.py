@@ -24,8 +24,10 @@ from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
 from deskew.acquisition.grey import grey_levels
 from deskew.acquisition.ink import InkSettings, correct_ink
 from deskew.acquisition.matches import require_same_devices
+from deskew.acquisition.materials import page_leaf
 from deskew.acquisition.mesh import PageMesh, page_mesh, page_sheet
 from deskew.acquisition.outline import Outline, page_outline, straight_outline
+from deskew.acquisition.pagemask import page_mask
 from deskew.acquisition.phase import PhaseSettings, decode_phase
 from deskew.acquisition.spheres import Probing, Sphere, fit_sphere, probe_sphere, spacing_error_mm
 from deskew.acquisition.stripes import decode_sweep
@@ -65,6 +67,8 @@ __all__ = [
     "grey_levels",
     "kitchen_rosenfeld_peaks",
     "length_errors",
+    "page_leaf",
+    "page_mask",
     "page_mesh",
     "page_outline",
     "page_sheet",

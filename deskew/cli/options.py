@@ -54,4 +54,11 @@ Stiffness = Annotated[
         help="Grey picture of material labels, with MAP.toml beside it: [stiffness], LABEL = k_s [kg/s^2].",
     ),
 ]
+FreeScale = Annotated[
+    bool,
+    typer.Option(
+        "--free-scale",
+        help="Let the softer of the map's two materials have shrunk or grown, and say by how much; spring alone.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]

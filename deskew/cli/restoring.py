@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from deskew.cli.options import (
     CaptureFolder,
     Combine,
     Denoise,
+    FreeScale,
     Ink,
     Json,
     Lights,
@@ -25,9 +27,12 @@ from deskew.cli.options import (
 from deskew.cli.pictures import PICTURES, Wanted, write_pictures
 from deskew.cli.printing import flattened_figures, projector_figures, report
 from deskew.cli.scanning import Scanning, scan_page
+from deskew.errors import require
 
 if TYPE_CHECKING:
     from deskew.types import Scan
+
+SCALING = "spring"  # the one method that finds a material's scale
 
 
 def restore(
@@ -35,6 +40,7 @@ def restore(
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
     method: Method = "spring",
     stiffness: Stiffness = None,
+    free_scale: FreeScale = False,
     lights: Lights = None,
     combine: Combine = None,
     scale: Scale = 1.0,
@@ -53,6 +59,7 @@ def restore(
 
     io.require_writable(output, PICTURES)
     wanted = Wanted.of(output, lights, combine, scale)
+    settings = _settings(method, free_scale, stiffness)
     materials = None if stiffness is None else io.read_stiffness(stiffness)
     found = io.read_scan(scan_file)
     wanted.check(list(found.images))
@@ -60,7 +67,7 @@ def restore(
         from deskew import pipeline
 
         found = pipeline.with_stiffness(found, materials)
-    restore_page(found, method, wanted, as_json)
+    restore_page(found, method, wanted, as_json, settings)
 
 
 def run(
@@ -69,6 +76,7 @@ def run(
     output: Annotated[Path, typer.Option("--output", "-o", help="Image to write: .png or .tif.")],
     method: Method = "spring",
     stiffness: Stiffness = None,
+    free_scale: FreeScale = False,
     shape: Shape = (45, 45),
     mask: Mask = None,
     ink: Ink = None,
@@ -92,11 +100,22 @@ def run(
     io.require_writable(output, PICTURES)
     require_method(method)
     wanted = Wanted.of(output, lights, combine, scale)
+    settings = _settings(method, free_scale, stiffness)
     how = Scanning(shape, mask, method, ink, denoise, stiffness)
-    restore_page(scan_page(capture, io.read_calibration(calibration), how, wanted), method, wanted, as_json)
+    page = scan_page(capture, io.read_calibration(calibration), how, wanted)
+    restore_page(page, method, wanted, as_json, settings)
 
 
-def restore_page(found: Scan, method: str, wanted: Wanted, as_json: bool) -> None:
+def _settings(method: str, free_scale: bool, stiffness: Path | None) -> dict[str, object]:
+    """Return the method's settings; what it cannot do is refused before the long work."""
+    if not free_scale:
+        return {}
+    require(method == SCALING, "--free-scale", f"be left out, since only the method {SCALING} finds a scale", method)
+    require(stiffness is not None, "--free-scale", "come with --stiffness, a map of two materials", "none")
+    return {"free_scale": True}
+
+
+def restore_page(found: Scan, method: str, wanted: Wanted, as_json: bool, settings: Mapping[str, object]) -> None:
     """Flatten and texture a scanned page, write its pictures and print the figures."""
     import numpy as np
 
@@ -104,7 +123,7 @@ def restore_page(found: Scan, method: str, wanted: Wanted, as_json: bool) -> Non
 
     known = list(found.images)
     needed = wanted.needed(known)
-    restored = pipeline.restore_lights(found, method=method, lights=needed, scale=wanted.scale)
+    restored = pipeline.restore_lights(found, method=method, lights=needed, scale=wanted.scale, **settings)
     page = np.isfinite(restored.backward_map[..., 0])
     pictures = {light: restored.images[light] for light in wanted.shown}
     for how in wanted.combine:

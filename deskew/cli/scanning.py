@@ -116,7 +116,7 @@ def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wan
     found = pipeline.scan_by(how.recipe(capture.pattern), capture, calibration, shape=how.shape, mask=mask)
     warn(found.projector, folder.name)
     if unshaded:
-        found = pipeline.with_shading_removed(found, capture, calibration)
+        found = pipeline.with_shading_removed(found, capture, calibration, how.recipe(capture.pattern))
     return found if materials is None else pipeline.with_stiffness(found, materials)
 
 

@@ -72,6 +72,9 @@ class StaticSettings:
     through : int
         Flatten every n-th vertex of a grid alone, with the others as its `surface`, and lay those down between them; in
         [1, 1000].
+    free_scale : bool
+        Whether the softer of a grid's two materials may have another size than it was scanned with, which is then found
+        too, see :mod:`.freescale`. Not with springs two steps long.
     """
 
     k_s: float = 1.0
@@ -83,6 +86,7 @@ class StaticSettings:
     tolerance: float = 2e-7
     max_iterations: int = 2000
     through: int = 1
+    free_scale: bool = False
 
     def __post_init__(self) -> None:
         _ = self.springs
@@ -95,6 +99,9 @@ class StaticSettings:
         require(fine, "tolerance", "be a number in [1e-12, 0.01]", repr(self.tolerance))
         require_whole("max_iterations", self.max_iterations, 1, MAX_ITERATIONS)
         require_whole("through", self.through, 1, 1000)
+        require(isinstance(self.free_scale, bool), "free_scale", "be True or False", repr(self.free_scale))
+        plain = not self.free_scale or self.bending == self.more == 0
+        require(plain, "free_scale", "be False with `bending` or `more`", self.free_scale)
 
     @property
     def springs(self) -> SpringSettings:

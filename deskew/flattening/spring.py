@@ -91,9 +91,9 @@ def _section_lengths(sheet: Sheet, mesh: Sheet, settings: StaticSettings) -> Flo
 
 def _require_plain(settings: StaticSettings) -> None:
     """Refuse what only the springs of a grid have."""
-    for name, plain in (("bending", 0.0), ("more", 0.0), ("through", 1)):
+    for name, plain in (("bending", 0), ("more", 0), ("through", 1), ("free_scale", False)):
         value = getattr(settings, name)
-        require(value == plain, name, f"be {plain:g} for a triangle mesh, with noise or another energy", value)
+        require(value == plain, name, f"be {plain} for a triangle mesh, with noise or another energy", value)
 
 
 def _triangles(sheet: Sheet) -> Sheet:

@@ -21,6 +21,7 @@ from deskew.flattening.anderson import Iterated, accelerate
 from deskew.flattening.chords import chord_lengths
 from deskew.flattening.descent import newton
 from deskew.flattening.flatforces import count_folded, flat_energy, flat_forces
+from deskew.flattening.freescale import SoftPart, settle_scale, shrink_percent, soft_part
 from deskew.flattening.gridstart import conformal_start
 from deskew.flattening.inside import flat_surface
 from deskew.flattening.laplace import laplacian
@@ -59,7 +60,8 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     -------
     Flattened
         With z = 0, at the mean place and in the direction that the sheet has as seen from above. Counters:
-        `iterations`, `residual_mm`, `spring_energy` [uJ], `folded_quads` and `starts`, the searches made. With its
+        `iterations`, `residual_mm`, `spring_energy` [uJ], `folded_quads` and `starts`, the searches made; with a free
+        scale `scale` too, and `shrink_estimated` [%], by which the soft material is smaller than it was. With its
         `surface`, where the sheet has one.
     """
     if settings.through > 1:
@@ -68,7 +70,14 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     # Springs would lay vertices on one line there again, and call it flat.
     require(has_area(sheet.vertices), "vertices", "span an area", "quads without area only")
     tolerance = settings.tolerance * float(max(np.ptp(sheet.vertices[..., axis]) for axis in range(3)))
+    part = soft_part(sheet, springs) if settings.free_scale else None
+    springs = springs if part is None else part.springs
     found, folded, n_starts = _unfolded(sheet, springs, tolerance, settings.max_iterations)
+    scaled: dict[str, float] = {}
+    if part is not None:
+        found, scale = _with_scale(part, found, tolerance, settings)
+        springs, folded = part.scaled(scale), int(count_folded(found.x, springs.cut, -1.0))
+        scaled = {"scale": scale, "shrink_estimated": shrink_percent(scale)}
     counters = {
         "iterations": float(found.n_iterations),
         "residual_mm": found.residual,
@@ -77,6 +86,7 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
         else float(flat_energy(found.x, springs.rest, springs.k_s)),
         "folded_quads": float(folded),
         "starts": float(n_starts),
+        **scaled,
     }
     status, remedy = Status.AT_REST, ""
     if folded:
@@ -86,6 +96,16 @@ def flatten_grid(sheet: Sheet, settings: StaticSettings) -> Flattened:
     flat = as_seen(found.x, sheet.vertices, -handedness(sheet.vertices))
     inside = None if sheet.surface is None else flat_surface(sheet.surface, flat, sheet.refinement)
     return Flattened(flat, status, remedy, counters, inside)
+
+
+def _with_scale(part: SoftPart, found: Iterated, tolerance: float, settings: StaticSettings) -> tuple[Iterated, float]:
+    """Bring springs that rest with scale 1 to rest with the scale that fits them; return it too."""
+
+    def settle(x: Floats, springs: Springs) -> Iterated:
+        unit = replace(springs, k_s=springs.k_s / springs.k_max)
+        return _settle_uneven(x, unit, tolerance, settings.max_iterations)
+
+    return settle_scale(part, found, settle, settings.tolerance)
 
 
 def _through(sheet: Sheet, settings: StaticSettings) -> Flattened:

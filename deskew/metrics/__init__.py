@@ -5,8 +5,10 @@ from deskew.metrics.corners import corner_distance
 from deskew.metrics.coverage import page_coverage
 from deskew.metrics.dense import dense_error
 from deskew.metrics.depth import depth_error
+from deskew.metrics.difference import image_difference, laid_onto
 from deskew.metrics.misses import Misses, count_misses, match_words
 from deskew.metrics.ocr import OcrEngine, OcrSettings, ocr_engine
+from deskew.metrics.regions import region_error
 from deskew.metrics.score import score_flattening
 from deskew.metrics.strain import flat_error, sheet_strain
 from deskew.metrics.stretch import sheet_stretch
@@ -23,9 +25,12 @@ __all__ = [
     "fit_affine",
     "fit_rigid",
     "flat_error",
+    "image_difference",
+    "laid_onto",
     "match_words",
     "ocr_engine",
     "page_coverage",
+    "region_error",
     "score_flattening",
     "sheet_strain",
     "sheet_stretch",

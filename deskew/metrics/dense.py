@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from deskew import projection
 from deskew.errors import StepError, require
@@ -11,6 +12,40 @@ from deskew.metrics.coverage import page_coverage
 from deskew.types import Floats, Restoration
 
 PIXELS_MIN = 100
+
+
+def pixel_places(restoration: Restoration, true_uv: Floats) -> tuple[npt.NDArray[np.bool_], Floats, Floats]:
+    """Return where restored pixels lie, and where they belong up to a rigid motion.
+
+    Parameters
+    ----------
+    restoration : Restoration
+        With its backward map.
+    true_uv : (H, W, 2) array
+        As for :func:`dense_error`.
+
+    Returns
+    -------
+    shown : (H, W) bool array
+        Pixels that show the page.
+    places, truth : (N, 2) arrays
+        World X, Y of these pixels on the bed, and (u, -v) of what they show [mm].
+
+    Raises
+    ------
+    StepError
+        If hardly any pixel shows the page.
+    """
+    shape = restoration.backward_map.shape
+    require(true_uv.shape == shape, "true_uv", f"have the backward map's shape {shape}", true_uv.shape)
+    shown = np.isfinite(true_uv).all(axis=-1) & np.isfinite(restoration.backward_map).all(axis=-1)
+    if int(shown.sum()) < PIXELS_MIN:
+        raise StepError(
+            f"Dense error: {int(shown.sum())} restored pixels show the page, at least {PIXELS_MIN} needed; "
+            "look at the restored image."
+        )
+    places = projection.onto_bed(restoration.camera, projection.pixel_grid(restoration.camera.size)[shown])
+    return np.asarray(shown), places, true_uv[shown] * np.array([1.0, -1.0])
 
 
 def dense_error(restoration: Restoration, true_uv: Floats, page_size_mm: tuple[float, float]) -> dict[str, float]:
@@ -40,16 +75,7 @@ def dense_error(restoration: Restoration, true_uv: Floats, page_size_mm: tuple[f
     -----
     u grows with the world's +X, v with -Y, so the true place of (u, v) is (u, -v) up to a rigid motion.
     """
-    shape = restoration.backward_map.shape
-    require(true_uv.shape == shape, "true_uv", f"have the backward map's shape {shape}", true_uv.shape)
-    shown = np.isfinite(true_uv).all(axis=-1) & np.isfinite(restoration.backward_map).all(axis=-1)
-    if int(shown.sum()) < PIXELS_MIN:
-        raise StepError(
-            f"Dense error: {int(shown.sum())} restored pixels show the page, at least {PIXELS_MIN} needed; "
-            "look at the restored image."
-        )
-    places = projection.onto_bed(restoration.camera, projection.pixel_grid(restoration.camera.size)[shown])
-    truth = true_uv[shown] * np.array([1.0, -1.0])
+    _, places, truth = pixel_places(restoration, true_uv)
     require_not_mirrored(places, truth, "Dense error")
     error = distances(fit_rigid(places, truth).apply(places), truth)
     return {

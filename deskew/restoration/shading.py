@@ -83,7 +83,7 @@ def surface_normals(points: Floats, sigma_px: float) -> Floats:
 
 
 def remove_shading(
-    white: Array, black: Array, camera: Pinhole, projector: Pinhole, points: Floats, sigma_px: float = 1.5
+    white: Array, black: Array, camera: Pinhole, projector: Pinhole, points: Floats, sigma_px: float = 0.6
 ) -> Array:
     """Return the page as if it lay level at the world's origin everywhere, its reflectance alone.
 
@@ -99,7 +99,8 @@ def remove_shading(
     points : (H, W, 3) array
         World point of each pixel of the UNDISTORTED grid [mm], as :func:`surface_points` gives them.
     sigma_px : float
-        Smoothing of the normals, see :func:`surface_normals`.
+        Smoothing of the normals, see :func:`surface_normals`. Little is right for a filtered depth map: normals that
+        are smoother than the picture leave a dark and a bright line along every crease. A raw one needs 2 or more.
 
     Returns
     -------

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from deskew.errors import StepError, require
 from deskew.restoration.registration import Registration, register
 from deskew.restoration.sampling import read_at
+from deskew.restoration.shading import UNSHADED
 from deskew.restoration.warp import texture_quads
 from deskew.types import WHITE, Array, Flattened, Pinhole, Restoration, Scan, Size
 
@@ -96,14 +97,18 @@ def _best(candidates: list[tuple[str, Array]], scan: Array) -> Registration:
 
 
 def restore_textures(
-    scan: Scan, flattened: Flattened, lights: Iterable[str] | None = None, scale: float = 1.0
+    scan: Scan,
+    flattened: Flattened,
+    lights: Iterable[str] | None = None,
+    scale: float = 1.0,
+    registrations: Mapping[str, Registration] | None = None,
 ) -> Textures:
     """Texture the flattened page with the image of every light; nothing is flattened again.
 
     Parameters
     ----------
     scan : Scan
-        The page and its images.
+        The page and its images; with an `unshaded` one, images of another format are registered to that.
     flattened : Flattened
         Its sheet, flattened.
     lights : names, optional
@@ -111,6 +116,8 @@ def restore_textures(
     scale : float
         Pixels of the restored views for each of the camera's, in (0, 16]; a texture's own resolution is reached at its
         `Registration.scale`.
+    registrations : mapping of light name to Registration, optional
+        As :func:`register_textures` found them before, for every wanted light in another format.
 
     Raises
     ------
@@ -128,7 +135,9 @@ def restore_textures(
     # Every image of a format helps to find its map, wanted or not.
     formats = {scan.images[light].shape[1::-1] for light in wanted} - {size}
     others = {light: image for light, image in scan.images.items() if image.shape[1::-1] in formats}
-    registrations = register_textures(others, white)
+    if registrations is None:
+        # Shading is no part of the page: light from another side shifts what the patches compare by .2 texture pixels.
+        registrations = register_textures(others, scan.images.get(UNSHADED, white))
     plain = texture_quads(white, scan.camera, scan.sheet, flattened, scale)
     images = {}
     for light in wanted:

@@ -42,7 +42,8 @@ def curve_points(curve: Curve, rows: Sequence[Row]) -> dict[str, list[Point]]:
         for condition, method, metric in sorted(values):
             if metric != curve.y or (condition != line and not condition.startswith(f"{line}/")):
                 continue
-            across = values.get((curve.conditions[0] + condition.removeprefix(line), "-", curve.x))
+            elsewhere = curve.conditions[0] + condition.removeprefix(line), "-", curve.x
+            across = values.get((condition, method, curve.x)) or values.get(elsewhere)
             if across:
                 name = line if method == "-" else f"{line} {method}"
                 lines[name].append(Point(fmean(across), summarise(values[condition, method, metric])))
@@ -58,8 +59,7 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
     axes = figure.subplots()
     for (text, low, high), colour in zip(curve.bands, _BAND_COLOURS, strict=False):
         axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=text)
-    shift = 0.0
-    for name, points in lines.items():
+    for i, (name, points) in enumerate(lines.items()):
         means = [point.y.mean for point in points]
         ends = [point.y.interval or (point.y.mean, point.y.mean) for point in points]
         reach = [
@@ -67,14 +67,16 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
             [high - mean for mean, (_, high) in zip(means, ends, strict=True)],
         ]
         # Side by side, so that intervals at one place do not hide each other.
-        across = [point.x + shift for point in points]
+        across = [point.x * 1.04**i if curve.log else point.x + 0.06 * i for point in points]
         axes.errorbar(across, means, reach, marker="o", markersize=4, capsize=3, linewidth=1.2, label=name)
-        shift += 0.06
     axes.set(xlabel=curve.x_label, ylabel=curve.y_label)
-    axes.set_ylim(bottom=0.0)
+    if curve.log:
+        axes.set(xscale="log", yscale="log")
+    else:
+        axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper left", frameon=False, fontsize=8)
+    axes.legend(loc="best" if curve.log else "upper left", frameon=False, fontsize=8)
     numbers = sorted({point.y.n for points in lines.values() for point in points})
     pages = f"{numbers[0]}" if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
-    axes.set_title(f"means of {pages} trials with their 95 % bootstrap intervals", fontsize=9)
+    axes.set_title(f"means with their 95 % bootstrap intervals; trials a point: {pages}", fontsize=9)
     return figure

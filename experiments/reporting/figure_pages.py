@@ -63,7 +63,7 @@ def figure_page(
     Returns
     -------
     bytes or None
-        A PNG of at most 300 dots an inch, fewer if it were larger than 2 MB; None if there is no picture at all.
+        A PNG of 300 dots an inch, or of fewer so that it stays below 2 MB; None if there is no picture at all.
     """
     methods = sorted({row.method for row in rows})
     shown = [column for column in _columns_of(page) if any(name in pictures for name in _names(page, column, methods))]
@@ -96,13 +96,13 @@ def _names(page: FigurePage, column: tuple[str, str], methods: Sequence[str]) ->
 def _strips(
     page: FigurePage, shown: Sequence[tuple[str, str]], methods: Sequence[str], pictures: Mapping[str, bytes]
 ) -> list[_Strip]:
-    """Return the lines of pictures, one that depends on the method once for each that has pictures."""
+    """Return the lines that have pictures, one that depends on the method once for each method."""
     strips = []
     for heading, template in page.lines:
         by_method = "{method}" in template
         for method in methods if by_method else [""]:
             names = tuple(template.format(column=column, method=method) for _, column in shown)
-            if not by_method or any(name in pictures for name in names):
+            if any(name in pictures for name in names):
                 strips.append(_Strip(f"{heading}\n{method}" if by_method else heading, names))
     return strips
 
@@ -174,8 +174,8 @@ class _Drawing:
         """Return the greatest width at which the pictures fill the page's width or its height."""
         across = (WIDTH_MM - _MARGIN_MM + _SPACE_MM) / n_side - _SPACE_MM
         heads = n_blocks * (_LINE_MM + (len(self.strips) + 2) * _SPACE_MM)
-        down = (HEIGHT_MM - self.y - below_mm - heads) / (n_blocks * sum(map(self._aspect, self.strips)))
-        return min(across, down)
+        aspect = n_blocks * sum(map(self._aspect, self.strips))
+        return min(across, (HEIGHT_MM - self.y - below_mm - heads) / aspect) if aspect else across
 
     def _aspect(self, strip: _Strip) -> float:
         """Height over width of the tallest picture of a line."""
@@ -187,7 +187,7 @@ class _Drawing:
         left = _MARGIN_MM + (WIDTH_MM - _MARGIN_MM - n * width - (n - 1) * _SPACE_MM) / 2
         places = [left + i * (width + _SPACE_MM) for i in range(n)]
         for place, (heading, _) in zip(places, self.shown[first : first + n], strict=False):
-            self._text(place + width / 2, self.y + _LINE_MM / 2, heading)
+            self._text(place + width / 2, self.y + _LINE_MM / 2, heading, va="center_baseline")
         self.y += _LINE_MM
         for numeral, strip in zip(_NUMERALS, self.strips, strict=False):
             height = width * self._aspect(strip)
@@ -249,7 +249,7 @@ class _Drawing:
 
     def _text(self, x: float, y: float, text: str, **style: Any) -> None:
         plain = {"fontsize": FONT_PT, "ha": "center", "va": "center", "linespacing": 1.1}
-        self.axes.text(x, y, text, **(plain | style))
+        self.axes.text(x, y, text, parse_math=False, **(plain | style))
 
 
 def _table_height_mm(table: NumbersTable) -> float:

@@ -72,10 +72,12 @@ class Curve:
     x, x_label, y, y_label : str
         The metrics, and how their axes are called, with the unit.
     conditions : tuple of str
-        A line each; its points are the condition and those that go on with "/" after it. The first one's rows tell
-        where a point of any line stands across.
+        A line each; its points are the condition and those that go on with "/" after it. A point's own rows tell where
+        it stands across, or else those of the first line.
     bands : tuple of (text, low, high)
         The paper's figures, drawn as bands across; in y's unit.
+    log : bool
+        Whether both axes are logarithmic; all figures are positive then.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Curve:
     y_label: str
     conditions: tuple[str, ...]
     bands: tuple[tuple[str, float, float], ...] = ()
+    log: bool = False
 
 
 @dataclass(frozen=True, slots=True)

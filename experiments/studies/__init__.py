@@ -14,6 +14,7 @@ STUDIES = {
     "ocr_misses": "experiments.studies.ocr_misses:OcrMisses",
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
+    "stiffness": "experiments.studies.stiffness:Stiffness",
     "real_boards": "experiments.studies.real_boards:RealBoards",
     "surfaces": "experiments.studies.surfaces:Surfaces",
     "integrators": "experiments.studies.integrators:Integrators",

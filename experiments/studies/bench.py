@@ -10,7 +10,7 @@ import data_synth
 from data_synth import Rig
 from deskew import pipeline
 from deskew.acquisition import SweepSettings
-from deskew.types import Calibration
+from deskew.types import Calibration, Pinhole
 from experiments.settings import Config, RigSettings
 
 # Random numbers of the calibration shots: a trial's number that no trial has, nor have those below it.
@@ -57,7 +57,7 @@ def configured_rig(settings: RigSettings) -> Rig:
     return replace(rig, config=config)
 
 
-def calibrated_bench(config: Config, mode: str, draw: int = 0) -> Bench:
+def calibrated_bench(config: Config, mode: str, draw: int = 0, camera: Pinhole | None = None) -> Bench:
     """Photograph the printed board in its poses and calibrate both devices from that.
 
     Parameters
@@ -68,8 +68,11 @@ def calibrated_bench(config: Config, mode: str, draw: int = 0) -> Bench:
         How the boards' sweeps are read.
     draw : int
         Picks other noise.
+    camera : Pinhole, optional
+        Another camera than the default rig's.
     """
     rig = configured_rig(config.rig)
+    rig = rig if camera is None else replace(rig, camera=camera)
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION - draw]))
     poses = data_synth.board_poses(config.rig.board_poses)
     captures = (data_synth.render_board(rig, pose, rng) for pose in poses)

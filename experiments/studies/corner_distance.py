@@ -27,7 +27,8 @@ from experiments.studies.views import DETECTORS, restored_corners, seen_corners
 from experiments.trials import Outcome, Recorder, TrialKey, reason_of
 
 _PAPER_PX, _PAPER_MM = 0.5, 0.25
-_N_SHOWN = 5
+# The reports are committed: as many pages as the paper shows, or every crumple that is shipped.
+_N_SHOWN = {"mirror": 5, "physical": data_synth.N_CRUMPLES}
 
 
 class CornerDistance(Study):
@@ -130,7 +131,7 @@ class CornerDistance(Study):
             sheet = trial_sheet(config, key, rng)
             flat, flat_truth = data_synth.render(bench.rig, data_synth.flat_sheet(page.page_size_mm), page, rng)
             capture, truth = data_synth.render(bench.rig, sheet, page, rng)
-        trial = _Trial(record, bench, page, truth)
+        trial = _Trial(record, bench, page, truth, pictured=key.trial < _N_SHOWN[config.sheet.kind])
         trial.measure_control(flat, flat_truth)
         trial.measure_unrestored(capture, sheet)
         recipes = methods_by_recipe(config)
@@ -152,8 +153,8 @@ class _Trial:
     cannot be scanned or restored is a failed row of each, not a missing one.
     """
 
-    def __init__(self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth) -> None:
-        self.record, self.bench, self.page, self.truth = record, bench, page, truth
+    def __init__(self, record: Recorder, bench: Bench, page: Checkerboard, truth: Truth, *, pictured: bool) -> None:
+        self.record, self.bench, self.page, self.truth, self.pictured = record, bench, page, truth, pictured
         self.camera = bench.calibration.camera
         self.view: Pinhole = restoration.view_camera(self.camera)
         self.corners_mm: Floats = page.corners.reshape(-1, 2)
@@ -241,6 +242,5 @@ class _Trial:
             self.record.fail(f"{condition}{name}", method, reason_of(error))
 
     def _picture(self, name: str, image: Array) -> None:
-        # As many pages as the paper shows: the reports are committed.
-        if self.record.key.trial < _N_SHOWN:
+        if self.pictured:
             self.record.picture(f"page_{self.record.key.trial}_{name}", image)

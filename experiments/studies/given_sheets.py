@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data_synth import TrueSheet
+from data_synth import TrueSheet, refined
+from data_synth.surfaces import edge_strain
 from deskew.errors import require
 from deskew.io import read_arrays
 from deskew.types import Array, Floats
@@ -14,6 +15,7 @@ from deskew.types import Array, Floats
 _REACH_MM = 1000.0
 # Chords over sharp folds are shorter than the paper between their ends, so not every edge can keep its length.
 _STRETCH = 0.2
+_MOSTLY = 4.0  # times what other edges are too long; on mirror folds none is, on simulated sheets both are alike
 
 
 def read_sheet(path: Path, page_size_mm: tuple[float, float]) -> TrueSheet:
@@ -45,6 +47,17 @@ def read_sheet(path: Path, page_size_mm: tuple[float, float]) -> TrueSheet:
     allowed = f"keep the lengths of F's edges to {_STRETCH:.0%} in the median"
     require(stretch <= _STRETCH, f"{path}: V", allowed, f"{stretch:.0%}")
     return TrueSheet(V, F)
+
+
+def refined_if_short(sheet: TrueSheet) -> TrueSheet:
+    """Refine a sheet whose chords are mostly shorter than the page between their ends: its vertices lie on a surface.
+
+    Where chords are as long as the page, as between creases that run along the grid's lines or after a simulation on
+    this very grid, the facets are the sheet, and a curve through the vertices would be too long.
+    """
+    strain = edge_strain(sheet)
+    short, long = float(np.maximum(-strain, 0.0).sum()), float(np.maximum(strain, 0.0).sum())
+    return refined(sheet) if short > _MOSTLY * long else sheet
 
 
 def _grid(values: Array, depth: int, name: str) -> Floats:

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 
 from deskew.types import Floats
 
+_HEIGHTS = 3.0
+
 
 def model_view(vertices: Floats, size: tuple[int, int] = (640, 480)) -> npt.NDArray[np.uint8]:
     """Draw a grid surface, shaded, from in front of and above the bed; heights are three times too large.
@@ -32,10 +34,11 @@ def model_view(vertices: Floats, size: tuple[int, int] = (640, 480)) -> npt.NDAr
     canvas: Any = FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((-0.12, -0.22, 1.24, 1.44), projection="3d")
     x, y, z = np.moveaxis(vertices[::-1], -1, 0)  # rows upwards, so that the lit side is the one above
+    z = _HEIGHTS * z  # before the light falls on it, which then shows what the outline shows
     light = LightSource(azdeg=315, altdeg=40)
     axes.plot_surface(x, y, z, rstride=1, cstride=1, color="0.95", lightsource=light, linewidth=0, antialiased=False)
     spans = [float(np.ptp(axis)) for axis in (x, y, z)]
-    axes.set_box_aspect((spans[0], spans[1], 3.0 * max(spans[2], 1.0)), zoom=1.2)
+    axes.set_box_aspect((spans[0], spans[1], max(spans[2], _HEIGHTS)), zoom=1.08)
     axes.view_init(elev=48, azim=-100)
     axes.set_axis_off()
     pixels, _ = canvas.print_to_buffer()

@@ -45,7 +45,7 @@ def _columns() -> tuple[Column, ...]:
     )
 
 
-_MAIN = ("control", "unrestored", "restored")
+_MAIN = ("control", "unrestored", "ideal", "restored")
 
 LAYOUT = Layout(
     "Experiment II: OCR (section 4.2, figure 4)",
@@ -58,7 +58,8 @@ LAYOUT = Layout(
         Section(
             "Misses",
             "How bent the sheets are was chosen once on unrestored pages and frozen (docs/adr/0019). `spring` is the "
-            "best method, `paper_*` the paper's as a whole, its scan included.",
+            "best method, `paper_*` the paper's as a whole, its scan included; `ideal` is the page warped back by its "
+            "true shape: what it misses is light read as marks, which no restoration that keeps the light can help.",
             _MAIN,
             (
                 "misses",
@@ -89,7 +90,7 @@ LAYOUT = Layout(
         Section(
             "Severity",
             "The same words on the same folds, bent more or less.",
-            ("unrestored/", "restored/"),
+            ("unrestored/", "ideal/", "restored/"),
             ("slope_p90_deg", "relief_mm", "misses", "misses_normalised", "error_rate_percent", "dense_mean_mm"),
         ),
         Section(
@@ -127,7 +128,7 @@ LAYOUT = Layout(
             "90th percentile of the slope [degrees]",
             "error_rate_percent",
             f"misses [% of {_LETTERS} letters]",
-            ("unrestored", "restored"),
+            ("unrestored", "ideal", "restored"),
             (("the paper, unrestored", 5.0, 10.0), ("the paper, restored", 1.0, 2.0)),
         ),
     ),

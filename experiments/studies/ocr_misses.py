@@ -16,7 +16,8 @@ from deskew.errors import require
 from deskew.metrics import OcrEngine, OcrSettings
 from deskew.recipes import Recipe
 from deskew.restoration import UNSHADED
-from deskew.types import WHITE, Array, Floats, Scan
+from deskew.types import WHITE, Array, Flattened, Floats, Scan, Sheet, Status
+from experiments.reporting import Layout
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
@@ -59,7 +60,9 @@ class OcrMisses(Study):
         The crumpled page as the camera sees it; here too its sheet and the calibration.
     `restored`
         The restored page, a row of figures for each method.
-    `unrestored/slope=S`, `restored/slope=S`
+    `ideal`
+        The crumpled page warped back by its true shape: the misses that no scan and no flattening can help.
+    `unrestored/slope=S`, `restored/slope=S`, `ideal/slope=S`
         The same at a further severity of `ocr.severities`; trial i has trial i's words and folds, bent more or less.
     `real/flat`, `real/crumpleseasy`, `real/crumpleshard`, ...
         Photographs of real documents, a trial a document; nobody knows their shape, so nothing is restored.
@@ -71,7 +74,7 @@ class OcrMisses(Study):
     that with its shading removed by the scanned shape and the calibrated projector.
     """
 
-    layout: ClassVar = LAYOUT
+    layout: ClassVar[Layout] = LAYOUT
 
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan a trial a page, one a page and further severity, and one a real document."""
@@ -117,6 +120,8 @@ class OcrMisses(Study):
         trial.measure_unrestored()
         if not trial.at:
             trial.measure_control()
+        if config.ocr.restore:
+            trial.measure_ideal()
         for recipe in trial.scans:
             for method in methods_by_recipe(config)[recipe]:
                 trial.measure_restored(recipe, method)
@@ -148,7 +153,7 @@ class _Trial:
             try:
                 with self.record.stage("scan"):
                     found = pipeline.scan_by(recipe, self.capture, self.bench.calibration, shape=shape)
-                self.scans[recipe] = pipeline.with_shading_removed(found, self.capture, self.bench.calibration)
+                self.scans[recipe] = pipeline.with_shading_removed(found, self.capture, self.bench.calibration, recipe)
             except Exception as error:
                 for method in methods:
                     self.record.fail(f"restored{self.at}", method, reason_of(error))
@@ -179,6 +184,18 @@ class _Trial:
         images = {WHITE: flat.white, UNSHADED: unshaded, **flat.textures}
         self.record.add("control", "-", self._read_as_it_lies("control", images, truth))
         self._picture("control", restoration.undistorted_view(flat.textures[SOFT.name], self.camera))
+
+    def measure_ideal(self) -> None:
+        """Restore the page by its true shape: what is missed there is the light's and the machine's own."""
+        width, height = self.page.page_size_mm
+        flat = self.sheet.flat * (1.0, -1.0) + (-width / 2, height / 2)
+        flattened = Flattened(np.concatenate([flat, np.zeros((*flat.shape[:2], 1))], axis=-1), Status.AT_REST)
+        condition, sheet = f"ideal{self.at}", Sheet(self.sheet.vertices)
+        with self.record.attempt(condition):
+            restored = restoration.texture_quads(self.capture.textures[SOFT.name], self.camera, sheet, flattened)
+            uv = self.truth.page_at(restored.backward_map.astype(np.float64))
+            figures = metrics.dense_error(restored, uv, self.page.page_size_mm)
+            self.record.add(condition, "-", figures | self._read(condition, "-", {SOFT.name: restored.image}, uv))
 
     def measure_restored(self, recipe: Recipe, method: str) -> None:
         """Restore by one method, read the result and measure where its paper lies."""

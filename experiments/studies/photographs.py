@@ -22,7 +22,7 @@ from experiments.trials import Recorder
 SOURCE = "FelixHertlein/inv3d-model @ bca21b5, input/inv3d_real/data"
 _WORDS, _FLAT = "ground_truth_words.json", "flat_document.png"
 # A capital of the invoices' body text, flat and in the photographs alike.
-_CAPITAL_PX = 18.0
+_CAPITAL_PX = 24.0
 
 
 def documents(folder: Path) -> list[Path]:

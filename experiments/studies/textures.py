@@ -13,8 +13,8 @@ import data_synth
 from data_synth import Format, Layer, Light, Manuscript, Truth
 from deskew import metrics, pipeline, restoration
 from deskew.errors import require
-from deskew.restoration import Registration, Textures
-from deskew.types import Array, Floats, Pinhole, Scan, Size
+from deskew.restoration import Textures
+from deskew.types import Array, Pinhole, Scan, Size
 from experiments.reporting import Column, Layout, Montage, Plot
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
@@ -22,6 +22,7 @@ from experiments.studies.flattened import flattening_figures
 from experiments.studies.hidden_writing import Reader
 from experiments.studies.methods import require_methods
 from experiments.studies.recipes import calibration_mode, methods_by_recipe
+from experiments.studies.registered import map_error
 from experiments.studies.study import Study
 from experiments.studies.trial_sheets import require_sheets, severity, sheet_inputs, trial_sheet
 from experiments.trials import Outcome, Recorder, TrialKey
@@ -164,7 +165,7 @@ class _Trial:
         condition = f"registration/{light.name}"
         with self.record.stage("register", condition), self.record.attempt(condition):
             found = restoration.register(image, white, light.name)
-            error = _map_error(found, self.truth.texture_maps[light.name], self.camera.size)
+            error = map_error(found, self.truth.texture_maps[light.name], self.camera.size)
             figures = {"error": error, "residual": found.residual_px, "uncertainty": found.uncertainty_px}
             self.record.add(condition, "-", {f"registration_{name}_px": value for name, value in figures.items()})
 
@@ -211,10 +212,3 @@ def _combinations(restored: Textures) -> dict[str, Array]:
     for how in _COMBINED:
         pictures |= restoration.combined(restored.images, page, how)
     return pictures
-
-
-def _map_error(found: Registration, true: Floats, size: Size) -> float:
-    """Root mean square over the scan's picture of the distance between the found and the true place [texture px]."""
-    pixels = np.stack(np.meshgrid(*(np.linspace(0, n - 1, 41) for n in size)), axis=-1)
-    error = found.to_texture(pixels) - (pixels @ true[:, :2].T + true[:, 2])
-    return float(np.sqrt((error**2).sum(axis=-1).mean()))

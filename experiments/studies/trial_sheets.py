@@ -10,7 +10,7 @@ import data_synth
 from data_synth import PAGE_SIZE_MM, TrueSheet
 from deskew.errors import require
 from experiments.settings import Config, SheetSettings
-from experiments.studies.given_sheets import read_sheet
+from experiments.studies.given_sheets import read_sheet, refined_if_short
 from experiments.trials import TrialKey
 
 _DRAWN_DEG = (3.0, 30.0)  # what a drawn physical crumple can be asked for
@@ -51,7 +51,7 @@ def sheet_inputs(config: Config) -> dict[str, Path]:
 def trial_sheet(
     config: Config, key: TrialKey, rng: np.random.Generator, page_size_mm: tuple[float, float] = PAGE_SIZE_MM
 ) -> TrueSheet:
-    """Return a trial's sheet, fine enough to be rendered.
+    """Return a trial's sheet, refined for rendering where that helps.
 
     Trial i takes file i of `sheet.paths`; without any, mirror folds are drawn, and of `sheet.kind=physical` trial i
     takes shipped crumple i modulo 8, so that its seed decides the noise alone, or with `sheet.drawn` one of its own.
@@ -69,7 +69,7 @@ def trial_sheet(
     """
     sheet = config.sheet
     if sheet.paths:
-        return data_synth.refined(read_sheet(Path(sheet.paths[key.trial]), page_size_mm))
+        return refined_if_short(read_sheet(Path(sheet.paths[key.trial]), page_size_mm))
     if sheet.kind == "mirror":
         return data_synth.crumpled(rng, page_size_mm, sheet.slope_p90_deg)
     if sheet.drawn:

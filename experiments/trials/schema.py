@@ -10,13 +10,16 @@ import numpy as np
 from deskew.errors import require
 
 # The unit is the name's last word; a metric without one is a count, a ratio or a flag.
-_UNITS = {"px": "px", "mm": "mm", "deg": "deg", "rad": "rad", "units": "units", "percent": "%", "mb": "MB", "s": "s"}
+_UNITS = {name: name for name in ("px", "mm", "deg", "rad", "units", "s")}
+_UNITS |= {"percent": "%", "grey": "grey levels", "mb": "MB"}
 
 
 def unit_of(metric: str) -> str:
-    """Return a metric's unit, by its name: `corner_mean_px` px, `seconds_render` s, `corners_missing` 1."""
+    """Return a metric's unit, by its name: `corner_mean_px` px, `seconds_render` s, `shrink_true` %, `flips` 1."""
     if metric.startswith("seconds_"):
         return "s"
+    if metric.startswith("shrink_"):
+        return "%"
     return _UNITS.get(metric.rsplit("_", 1)[-1], "1")
 
 

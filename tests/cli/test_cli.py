@@ -93,12 +93,14 @@ class StandIn:
         self._step("stiffness", materials=materials)
         return scan
 
-    def with_shading_removed(self, scan: Scan, page: Capture, calibration: Calibration) -> Scan:
-        self._step("unshade", calibration=calibration)
+    def with_shading_removed(self, scan: Scan, page: Capture, calibration: Calibration, recipe: Recipe) -> Scan:
+        self._step("unshade", calibration=calibration, recipe=recipe)
         return replace(scan, images={**scan.images, "unshaded": page.white - page.black})
 
-    def restore_lights(self, scan: Scan, *, method: str, lights: Sequence[str], scale: float) -> Textures:
-        self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale)
+    def restore_lights(
+        self, scan: Scan, *, method: str, lights: Sequence[str], scale: float, **settings: object
+    ) -> Textures:
+        self._step("restore", scan=scan, method=method, lights=list(lights), scale=scale, settings=settings)
         remedy = "" if self.status is Status.AT_REST else "push harder"
         flattened = Flattened(
             scan.sheet.vertices, self.status, remedy, {"steps": 7, "spring_energy": np.float64("nan")}
@@ -224,6 +226,23 @@ def test_a_stiffness_map_is_taken_when_asked_for(
     steps.calls.clear()
     code, out, err = run(f"{start} -o out/t.png --stiffness dark.png", capsys)
     assert (code, out, err) == (2, "", "deskew: `dark.toml` must be a file, got nothing there.\n")
+    assert not steps.calls
+
+
+@pytest.mark.parametrize("start", ["run page -c c.json", "restore scan.npz"])
+def test_a_free_scale_is_the_methods_setting_and_needs_a_map(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], start: str
+) -> None:
+    (here / "mask.toml").write_text("[stiffness]\n255 = 3.5\n")
+    assert run(f"{start} -o out/r.png --stiffness mask.png", capsys)[0] == 0
+    assert steps.calls["restore"]["settings"] == {}
+    assert run(f"{start} -o out/r.png --stiffness mask.png --free-scale", capsys)[0] == 0
+    assert steps.calls["restore"]["settings"] == {"free_scale": True}
+    steps.calls.clear()
+    wanted = "deskew: `--free-scale` must come with --stiffness, a map of two materials, got none.\n"
+    assert run(f"{start} -o out/r.png --free-scale", capsys) == (2, "", wanted)
+    wanted = "deskew: `--free-scale` must be left out, since only the method spring finds a scale, got paper_rk4.\n"
+    assert run(f"{start} -o out/r.png -m paper_rk4 --stiffness mask.png --free-scale", capsys) == (2, "", wanted)
     assert not steps.calls
 
 
@@ -532,7 +551,7 @@ def test_the_module_ends_with_the_exit_code() -> None:
 def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
     program = (
         "import sys; from deskew.cli import main, printing, restoring\n"
-        "def restore(found, method, wanted, as_json):\n"
+        "def restore(found, method, wanted, as_json, settings):\n"
         "    wanted.output.touch(); printing.report({}, as_json, wanted.output)\n"
         "restoring.restore_page = restore\n"
         "sys.exit(main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"

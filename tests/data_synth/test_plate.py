@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from data_synth.cylinder import Bend, roll
-from data_synth.plate import Plate, band_width, curvatures, derivatives, energy, normals, unbent, yielded
+from data_synth.plate import Plate, band_width, curvatures, derivatives, energy, normals, unbent, unchanged, yielded
 from data_synth.relaxation import relax, relax_plastically
 from deskew.types import Floats
 
@@ -21,13 +21,13 @@ def page(shape: tuple[int, int] = SHAPE, spacing: tuple[float, float] = SPACING)
 
 
 def free(shape: tuple[int, int] = SHAPE, spacing: tuple[float, float] = SPACING) -> Plate:
-    return Plate(spacing, 0.5, unbent(shape), np.zeros(shape), np.zeros(shape))
+    return Plate(spacing, 0.5, unbent(shape), np.zeros(shape), np.zeros(shape), unchanged(shape))
 
 
 def loaded(rng: np.random.Generator) -> Plate:
     n, m = SHAPE
     rest = (0.1 * rng.normal(size=(n, m)), 0.1 * rng.normal(size=(n, m)), 0.1 * rng.normal(size=(n - 1, m - 1)))
-    return Plate(SPACING, 0.5, rest, rng.random(SHAPE), rng.random(SHAPE))
+    return Plate(SPACING, 0.5, rest, rng.random(SHAPE), rng.random(SHAPE), rng.uniform(0.95, 1.05, (n - 1, m - 1)))
 
 
 def dense(band: Floats) -> Floats:

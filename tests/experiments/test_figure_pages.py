@@ -156,6 +156,12 @@ def test_noise_costs_resolution_not_room() -> None:
     assert struct.unpack(">I", found[16:20])[0] >= 100 / 25.4 * WIDTH_MM - 1
 
 
+def test_a_page_whose_scans_all_failed_still_shows_its_control() -> None:
+    rows = [row(0, "unrestored", "-", "corner_mean_px", 1.0), row(0, "restored", "a", "failed", 1.0)]
+    image = drawn(PAGE, rows, {"page_0_control": png(77)})
+    assert (image == 77).sum() > 10_000
+
+
 def test_pictures_on_a_page_are_not_written_again_and_none_is_no_page() -> None:
     assert set(pictures(3)) == {name for name in pictures_on(PAGE, trials(3)) if not name.endswith(("_", "-"))}
     assert pictures_on(CASES, trials(1)) == {"case_A_stiffer", "case_B_stiffer"}

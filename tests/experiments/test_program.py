@@ -35,6 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("sheet.slope_p90_deg=nan", ("`sheet.slope_p90_deg`", "[1, 45]", "nan")),
         ("sheet.slope_p90_deg=steep", ("`sheet.slope_p90_deg`", "[1, 45] degrees", "'steep'")),
         ("sheet.kind=silk", ("`sheet.kind`", "mirror", "'silk'")),
+        ("sheet.drawn=maybe", ("`sheet.drawn`", "true or false", "maybe")),
         ("sheet.paths=[a.png]", ("`sheet.paths`", "NPZ", "a.png")),
         ("rig.noise_scale=-0.5", ("`rig.noise_scale`", "[0, 10]", "-0.5")),
         ("rig.colour=red", ("`rig.colour`", "noise_scale")),
@@ -60,8 +61,8 @@ ROOT = Path(__file__).resolve().parents[2]
         ("engine=slurm", ("`engine`", "processes, serial", "'slurm'")),
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
         (
-            "experiment=stiffness",
-            ("`experiment`", ", ".join(sorted([*STUDIES, "fake"])), "'stiffness'"),
+            "experiment=colours",
+            ("`experiment`", ", ".join(sorted([*STUDIES, "fake"])), "'colours'"),
         ),
         ("trials=[1", ("`trials=[1`", "KEY=VALUE")),
         ("trials", ("`trials`", "KEY=VALUE")),

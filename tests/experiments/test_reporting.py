@@ -45,6 +45,9 @@ def test_csv_does_not_depend_on_the_order_of_its_rows() -> None:
         ("corners_missing", "1"),
         ("page_coverage", "1"),
         ("misses", "1"),
+        ("shrink_estimated", "%"),
+        ("difference_rms_grey", "grey levels"),
+        ("error_rate_percent", "%"),
     ],
 )
 def test_unit_is_the_last_word_of_the_metric(metric: str, unit: str) -> None:

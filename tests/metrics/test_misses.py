@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rapidfuzz.distance import Levenshtein
 
@@ -11,17 +11,20 @@ from deskew.metrics.misses import Misses
 texts = st.text(st.sampled_from("ABCD"), max_size=24)
 
 
+@settings(deadline=None)
 @given(texts)
 def test_a_text_read_as_it_is_has_no_misses(text: str) -> None:
     assert count_misses(text, text) == Misses(0, 0, 0, len(text))
 
 
+@settings(deadline=None)
 @given(texts.filter(bool), st.data())
 def test_one_letter_read_as_another_is_one_substitution(text: str, data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(text) - 1))
     assert count_misses(f"{text[:at]}x{text[at + 1 :]}", text) == Misses(1, 0, 0, len(text))
 
 
+@settings(deadline=None)
 @given(texts, st.data())
 def test_one_letter_too_many_is_one_insertion_and_one_too_few_one_deletion(text: str, data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(text)))
@@ -30,6 +33,7 @@ def test_one_letter_too_many_is_one_insertion_and_one_too_few_one_deletion(text:
     assert count_misses(text, longer) == Misses(0, 0, 1, len(text) + 1)
 
 
+@settings(deadline=None)
 @given(texts, texts, st.lists(st.sampled_from([" ", "\n", "\t", ""]), min_size=24, max_size=24))
 def test_white_space_does_not_matter(read: str, true: str, spaces: list[str]) -> None:
     def spread(text: str) -> str:
@@ -38,6 +42,7 @@ def test_white_space_does_not_matter(read: str, true: str, spaces: list[str]) ->
     assert count_misses(spread(read), spread(true)) == count_misses(read, true)
 
 
+@settings(deadline=None)
 @given(texts, texts)
 def test_exchanging_the_texts_exchanges_insertions_and_deletions(first: str, second: str) -> None:
     there, back = count_misses(first, second), count_misses(second, first)
@@ -48,6 +53,7 @@ def test_exchanging_the_texts_exchanges_insertions_and_deletions(first: str, sec
     )
 
 
+@settings(deadline=None)
 @given(texts, texts)
 def test_the_counts_are_an_alignment_with_the_fewest_edits(read: str, true: str) -> None:
     found = count_misses(read, true)
@@ -76,6 +82,7 @@ def test_of_equally_short_alignments_the_one_with_most_substitutions_counts() ->
     assert count_misses("BA", "AB") == Misses(2, 0, 0, 2)
 
 
+@settings(deadline=None)
 @given(st.permutations(["net", "net", "total", "12.50"]))
 def test_a_bag_of_words_has_no_order(words: list[str]) -> None:
     assert match_words(words, ["net", "total", "net", "12.50"]) == {"word_recall": 1.0, "word_precision": 1.0}

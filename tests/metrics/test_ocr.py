@@ -99,7 +99,9 @@ def test_an_unknown_engine_is_refused() -> None:
         ocr_engine("readiris")
 
 
-@pytest.mark.parametrize(("capital_px", "height"), [(8.0, 300), (12.0, 300), (16.0, 300), (21.0, 171), (72.0, 50)])
+@pytest.mark.parametrize(
+    ("capital_px", "height"), [(5.0, 500), (8.0, 300), (16.0, 300), (21.0, 200), (30.0, 100), (100.0, 50)]
+)
 def test_capitals_are_brought_to_the_height_that_the_model_reads_best(capital_px: float, height: int) -> None:
     grey = np.zeros((100, 40), np.uint8)
     found = ocr.enlarged(grey, capital_px)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from deskew import projection
-from deskew.errors import InputError
-from deskew.restoration import restore_textures, texture_quads
+from deskew.errors import InputError, StepError
+from deskew.restoration import UNSHADED, Registration, restore_textures, texture_quads
 from deskew.types import DepthMap, Flattened, Floats, Pinhole, Scan, Sheet, Status
 
 SIZE = (240, 180)
@@ -48,6 +50,26 @@ def test_lights_of_the_scans_size_need_no_alignment(scale: float) -> None:
         assert np.array_equal(found.images[light], alone.image)
         assert np.array_equal(found.backward_map, alone.backward_map, equal_nan=True)
     assert not found.registrations
+
+
+def test_registrations_found_before_are_taken_as_they_are() -> None:
+    given = {"fine": Registration(SCALE, OFFSET)}
+    found = restore_textures(PAGE, FLAT, ["fine"], 2.0, given)
+    assert found.registrations == given
+    shown = np.isfinite(found.backward_map).all(axis=-1)
+    true = scene(found.backward_map.astype(float))[shown]
+    assert 0 < np.sqrt(((found.images["fine"][shown] - true) ** 2).mean()) < 0.5
+    shifted = restore_textures(PAGE, FLAT, ["fine"], 2.0, {"fine": Registration(SCALE, OFFSET + np.array([3.0, 0.0]))})
+    assert np.sqrt(((shifted.images["fine"][shown] - true) ** 2).mean()) > 5.0
+
+
+def test_another_format_is_registered_to_the_page_without_shading_where_there_is_one() -> None:
+    white = PAGE.images["white"]
+    dark = replace(PAGE, images={**PAGE.images, "white": np.full_like(white, 90.0)})
+    with pytest.raises(StepError, match="fine"):
+        restore_textures(dark, FLAT, ["fine"])
+    found = restore_textures(replace(dark, images={**dark.images, UNSHADED: white}), FLAT, ["fine"])
+    assert np.allclose(found.registrations["fine"].scale, SCALE, atol=1e-3)
 
 
 def test_another_format_lands_on_the_same_pixels() -> None:
