@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import os
+import subprocess
+import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -78,20 +80,29 @@ def test_the_triad_moves_the_bytes_that_it_is_asked_for(monkeypatch: pytest.Monk
     assert a.tolist() == [3, 4, 5, 6, 7, 8, 9]
 
 
+_MEASURED = """
+import numpy as np
+from experiments.trials import Recorder, TrialKey
+record = Recorder(TrialKey("speed"))
+with record.memory("large"):
+    block = np.ones(25_000_000)
+assert block.sum() == 25_000_000
+del block
+with record.memory("small"):
+    pass
+found = {row.condition: row.value for row in record.outcome().timings}
+print(found["large"], found["small"], found["-"])
+"""
+
+
 def test_peak_memory_is_each_stages_own_and_the_trials_is_the_highest() -> None:
-    record = Recorder(TrialKey("speed"))
-    with record.memory("large"):
-        block = np.ones(25_000_000)
-    assert block.sum() == 25_000_000
-    del block
-    with record.memory("small"):
-        pass
-    found = timings(record)
-    large, small = (found[name, "-"]["peak_mb"] for name in ("large", "small"))
-    assert 0.0 < small <= large
+    # In a process of its own: one that has run other tests holds memory that the system may take back meanwhile.
+    root = Path(__file__).parents[2]
+    done = subprocess.run([sys.executable, "-c", _MEASURED], cwd=root, capture_output=True, text=True, check=True)
+    large, small, trial = map(float, done.stdout.split())
+    assert 0.0 < small <= large <= trial
     if os.access("/proc/self/clear_refs", os.W_OK):
         assert large - small > 150
-    assert found["-", "-"]["peak_mb"] >= large
 
 
 def test_a_profile_names_kernels_and_functions_without_their_folders() -> None:
