@@ -117,7 +117,7 @@ LAYOUT = Layout(
             control=("control", "page_{column}_control"),
             numbers=Numbers(
                 (("control", "control"), ("unrestored", "unrestored"), ("restored", "restored")),
-                ("slope_p90_deg", "relief_mm", "misses", "error_rate_percent"),
+                ("slope_p90_deg", "relief_mm", "misses"),
             ),
         ),
     ),
