@@ -63,10 +63,16 @@ def diagram_plot(diagram: Diagram, rows: Sequence[Row]) -> Figure | None:
     places = figure.subplots(1, len(diagram.panels), squeeze=False)[0]
     for axes, panel in zip(places, diagram.panels, strict=True):
         _draw(axes, panel, values, methods)
-    handles, labels = places[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 6), frameon=False, fontsize=8)
+    named = _legend(places)
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=6, frameon=False, fontsize=8)
     figure.suptitle(diagram.title, fontsize=10)
     return figure
+
+
+def _legend(places: Sequence[Any]) -> dict[str, Any]:
+    """Return the lines of all panels by name."""
+    found = [axes.get_legend_handles_labels() for axes in places]
+    return {name: line for lines, names in found for line, name in zip(lines, names, strict=True)}
 
 
 def _draw(axes: Any, panel: Panel, values: Values, methods: Sequence[str]) -> None:

@@ -120,6 +120,7 @@ def map_outcomes(record: Recorder, page: Page, pushes: Sequence[float], methods:
     """Flatten one page at every push: flat, locked, folded or diverged."""
     for push in pushes:
         condition = f"outcomes/push={push:g}"
+        record.add(condition, "-", {"slope_p90_deg": page.slope_p90_deg, "relief_mm": page.relief_mm})
         for method in methods:
             with record.attempt(condition, method):
                 result = flattening.flatten(page.sheet, method="particles", integrator=method, push=push)
