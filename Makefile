@@ -13,7 +13,8 @@ JOBS ?= 2
 BIN := .venv/bin
 STAMP := .venv/.complete
 SOURCES := deskew data_synth experiments tests
-EXPERIMENTS := plane_accuracy corner_distance corner_distance_physical ocr_misses stiffness surfaces surfaces_noisy real_boards
+EXPERIMENTS := plane_accuracy corner_distance corner_distance_physical ocr_misses stiffness integrators
+EXPERIMENTS += surfaces surfaces_noisy real_boards
 # Beyond the paper; they take as long again, so only the largest budget runs them.
 EXPERIMENTS += $(if $(filter full,$(BUDGET)),decoders textures ablations)
 

@@ -258,6 +258,43 @@ class SurfacesSettings(Checked):
     noise_mm: float = number(0.0, 0.0, 10.0, "mm")
 
 
+def _numbers(values: list[Any], low: float, high: float) -> bool:
+    return len(set(values)) == len(values) > 0 and all(low <= value <= high for value in values)
+
+
+@dataclass
+class IntegratorsSettings(Checked):
+    """The comparison of integrators, which `method` names here.
+
+    `damping_ratios`: of the springs' stiffest mode, for stable steps and flattening.
+    `stiffness`: k_s [kg/s^2] at which sheets of the same mass are flattened under the same weight.
+    `pushes`: weight of a vertex over k_s times a spring's length, for the map of outcomes.
+    `mapped`: integrators in that map.
+    """
+
+    group: ClassVar[str] = "integrators."
+    damping_ratios: list[float] = setting(
+        [0.1, 0.2, 0.5, 0.8, 1.0],
+        "be a list of different numbers in [0.01, 10]",
+        lambda values: _numbers(values, 0.01, 10.0),
+    )
+    stiffness: list[float] = setting(
+        [0.1, 1.0, 10.0, 100.0],
+        "be a list of different numbers in [0.001, 100000] kg/s^2",
+        lambda values: _numbers(values, 1e-3, 1e5),
+    )
+    pushes: list[float] = setting(
+        [0.002, 0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5.0],
+        "be a list of different numbers in [0.00001, 100]",
+        lambda values: _numbers(values, 1e-5, 100.0),
+    )
+    mapped: list[str] = setting(
+        ["euler", "rk4"],
+        "be a list of different integrators",
+        lambda values: len(set(values)) == len(values) and all(isinstance(value, str) and value for value in values),
+    )
+
+
 @dataclass
 class DecodersSettings(Checked):
     """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
@@ -315,6 +352,7 @@ class Config(Checked):
     rig: RigSettings = field(default_factory=RigSettings)
     scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
+    integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ocr: ReadingSettings = field(default_factory=ReadingSettings)

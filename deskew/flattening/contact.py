@@ -33,7 +33,7 @@ class Plane(NamedTuple):
     Attributes
     ----------
     eps : float
-        Distance under which a particle counts as touching [mm].
+        Distance under which a particle counts as touching [mm]; negative where there is no plane at all.
     k_r : float
         Coefficient of restitution, in [0, 1].
     literal : bool
@@ -45,11 +45,17 @@ class Plane(NamedTuple):
     literal: bool
 
 
+NOWHERE = Plane(-1.0, 0.0, False)
+"""No plane: free flight."""
+
+
 @njit(cache=True, error_model="numpy")
 def sunk(z, plane):  # type: ignore[no-untyped-def]
     """Count the particles whose height z : (V,) [mm] makes the step one to be halved."""
-    lowest = 0.0 if plane.literal else -plane.eps
     count = 0
+    if plane.eps < 0.0:
+        return count
+    lowest = 0.0 if plane.literal else -plane.eps
     for i in range(uintp(z.shape[0])):
         count += z[i] < lowest
     return count
@@ -71,6 +77,8 @@ def collide(z, v_normal, plane, gravity, dt):  # type: ignore[no-untyped-def]
         The step just made [s].
     """
     strikes = 0
+    if plane.eps < 0.0:
+        return strikes
     resting = 0.0 if plane.literal else RESTING_STEPS * gravity * dt
     for i in range(uintp(z.shape[0])):
         if z[i] < plane.eps and v_normal[i] < 0.0:

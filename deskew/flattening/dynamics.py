@@ -16,7 +16,9 @@ from deskew.errors import require
 from deskew.flattening.contact import Plane
 from deskew.flattening.flatforces import count_folded
 from deskew.flattening.forces import System, spring_energy, system
-from deskew.flattening.integrators import CONTACTS, EVALUATIONS, REJECTED, STEPS, Run, Scheme, advance, start
+from deskew.flattening.integrators import CONTACTS, EVALUATIONS, REJECTED, STEPS, Pace, Run, advance, start
+from deskew.flattening.outside import Outside, advance_outside
+from deskew.flattening.schemes import INTEGRATORS, Scheme
 from deskew.flattening.settings import ParticleSettings
 from deskew.flattening.springs import Springs, grid_springs
 from deskew.flattening.stability import largest_stable_step, stiffest_mode
@@ -32,13 +34,23 @@ NEGLIGIBLE_STRAIN = 1e-6
 # A strain of 1 in the mean over all springs is no sheet any more.
 RUNAWAY_STRAIN = 1.0
 DT_SAFETY = 0.9
+# Implicit Euler has no limit: its step, in units of the longest that explicit Euler may ever make, 2 / sqrt(lam_max).
+DT_IMPLICIT = 4.0
 # The step is never halved further than this share of the full one; literal halving goes on until it is absurd.
 DT_FLOOR = {"working": 2.0**-10, "literal": 1e-12}
 
-_DAMPING_RATIO = 0.8
-_PUSH = 0.5
 _DRAG = 3.0
 _SINKING = 0.5
+
+HISTORY = (
+    "time_s",
+    "force_evaluations",
+    "spring_energy_uj",
+    "kinetic_energy_uj",
+    "potential_energy_uj",
+    "height_max_mm",
+)
+"""What is kept of a run, at its start and after every stride; the potential energy is that of the strong push."""
 
 _REMEDY = {
     Status.LOCKED: "Particles hang {z:.2f} mm above the plane in a buckle that holds: raise `gravity`.",
@@ -62,15 +74,18 @@ class Constants:
         Downward acceleration once the whole sheet lies within eps of the plane [mm/s^2].
     plane : Plane
         Contact with the bed.
-    dt, dt_floor : float
-        Full step and the least it may be halved to [s].
+    pace : Pace
+        Full step, the least that it may be halved to, and what an embedded pair takes for exact.
+    window, stride : int
+        Steps after which the sheet is looked at for rest, and after which the history gets an entry.
     """
 
     physics: System
     weak_gravity: float
     plane: Plane
-    dt: float
-    dt_floor: float
+    pace: Pace
+    window: int
+    stride: int
 
 
 def folded_quads(xy: Floats, cut: npt.NDArray[np.bool_] | None = None) -> int:
@@ -82,7 +97,7 @@ def folded_quads(xy: Floats, cut: npt.NDArray[np.bool_] | None = None) -> int:
     return min(int(count_folded(xy, none if cut is None else cut, up)) for up in (1.0, -1.0))
 
 
-def choose_constants(springs: Springs, x: Array, scheme: Scheme, settings: ParticleSettings) -> Constants:
+def choose_constants(springs: Springs, x: Array, integrator: Scheme | Outside, settings: ParticleSettings) -> Constants:
     """Fill in the settings that were left to choose.
 
     Parameters
@@ -91,7 +106,7 @@ def choose_constants(springs: Springs, x: Array, scheme: Scheme, settings: Parti
         With their rest lengths.
     x : (3, V) array
         The sheet at rest [mm].
-    scheme : Scheme
+    integrator : Scheme or Outside
         The integrator, whose stability sets the step.
     settings : ParticleSettings
         None where to choose.
@@ -103,20 +118,25 @@ def choose_constants(springs: Springs, x: Array, scheme: Scheme, settings: Parti
     """
     k, mass = springs.k_max, settings.mass
     drag = _DRAG * np.sqrt(k * mass) / max(springs.grid) if settings.drag is None else settings.drag
-    gravity = _PUSH * k * springs.rest_mean / mass if settings.gravity is None else settings.gravity
+    gravity = settings.push * k * springs.rest_mean / mass if settings.gravity is None else settings.gravity
     physics = system(springs, beta=0.0, mass=mass, gravity=gravity, drag=drag)
     lam_max = stiffest_mode(x, physics)
-    beta = 2 * _DAMPING_RATIO / np.sqrt(lam_max) if settings.k_d is None else settings.k_d / k
-    limit = largest_stable_step(scheme, lam_max, beta, drag / mass)
-    dt = DT_SAFETY * limit if settings.dt is None else settings.dt
+    beta = 2 * settings.damping_ratio / np.sqrt(lam_max) if settings.k_d is None else settings.k_d / k
+    dt = settings.dt
+    if dt is None:
+        limit = largest_stable_step(integrator, lam_max, beta, drag / mass)
+        dt = DT_SAFETY * limit if np.isfinite(limit) else DT_IMPLICIT * 2 / np.sqrt(lam_max)
     require(dt > 0, "k_d", "be positive, or `drag` be: this integrator is unstable at every step without", settings.k_d)
     weak = min(gravity, _SINKING * settings.eps_mm / dt**2) if settings.weak_gravity is None else settings.weak_gravity
     plane = Plane(float(settings.eps_mm), float(settings.k_r), settings.halving == "literal")
-    floor = dt * DT_FLOOR[settings.halving]
-    return Constants(physics._replace(beta=float(beta)), float(weak), plane, float(dt), float(floor))
+    pace = Pace(float(dt), float(dt * DT_FLOOR[settings.halving]), float(settings.tolerance_mm))
+    implicit = isinstance(integrator, Scheme) and integrator.implicit
+    window = round(WINDOW / DT_IMPLICIT) if implicit else WINDOW
+    stride = window if settings.stride is None else settings.stride
+    return Constants(physics._replace(beta=float(beta)), float(weak), plane, pace, window, stride)
 
 
-def settle(sheet: Sheet, scheme: Scheme, settings: ParticleSettings) -> Flattened:
+def settle(sheet: Sheet, integrator: Scheme | Outside, settings: ParticleSettings) -> Flattened:
     """Let a sheet fall onto Z = 0 and relax there.
 
     The sheet starts at rest, lowered or lifted so that its lowest vertex touches the plane.
@@ -125,7 +145,7 @@ def settle(sheet: Sheet, scheme: Scheme, settings: ParticleSettings) -> Flattene
     ----------
     sheet : Sheet
         A grid of vertices [mm], with or without a stiffness for each quad.
-    scheme : Scheme
+    integrator : Scheme or Outside
         The integrator.
     settings : ParticleSettings
         The paper's constants.
@@ -136,51 +156,80 @@ def settle(sheet: Sheet, scheme: Scheme, settings: ParticleSettings) -> Flattene
         With counters `steps`, `steps_rejected`, `force_evaluations`, `contacts`, `folded_quads`, `spring_energy` [uJ],
         `kinetic_energy` [uJ], `height_max_mm` (before z is set to 0 on `AT_REST`), `dt`, `dt_smallest` and `time` [s],
         and the constants chosen: `k_d` [kg/s], `gravity`, `weak_gravity` [mm/s^2] and `drag`
-        [kg/s].
+        [kg/s]; and with its `history`.
+
+    Raises
+    ------
+    StepError
+        If an integrator from outside breaks.
     """
     springs = grid_springs(sheet, settings.springs)
     vertices = sheet.vertices - [0.0, 0.0, sheet.vertices[..., 2].min()]
     x = np.ascontiguousarray(vertices.reshape(-1, 3).T)
-    constants = choose_constants(springs, x, scheme, settings)
-    run = start(vertices, scheme, constants.dt)
+    constants = choose_constants(springs, x, integrator, settings)
+    stages = integrator if isinstance(integrator, Scheme) else INTEGRATORS["euler"]
+    run = start(vertices, stages, constants.pace.dt_max)
     # A runaway ends in infinities on its way to `DIVERGED`: that is an outcome, not a warning.
     with np.errstate(all="ignore"):
-        status, remedy, collapsed = _run_to_rest(run, scheme, springs, constants, settings.max_steps)
+        history: list[tuple[float, ...]] = []
+        status, remedy, collapsed = _run_to_rest(run, integrator, springs, constants, settings.max_steps, history)
         counters = _counters(run, springs, constants)
     counters["step_collapsed"] = float(collapsed)
     if status is Status.AT_REST:
         run.x[2] = 0.0
         counters["spring_energy"] = float(spring_energy(run.x, constants.physics))
-    return Flattened(run.x.T.reshape(vertices.shape), status, remedy, counters)
+    columns = dict(zip(HISTORY, np.array(history).T, strict=True))
+    return Flattened(run.x.T.reshape(vertices.shape), status, remedy, counters, history=columns)
 
 
 def _run_to_rest(
-    run: Run, scheme: Scheme, springs: Springs, constants: Constants, max_steps: int
+    run: Run,
+    integrator: Scheme | Outside,
+    springs: Springs,
+    constants: Constants,
+    max_steps: int,
+    history: list[tuple[float, ...]],
 ) -> tuple[Status, str, bool]:
     """Advance window by window until an outcome is known; return it, its remedy, and whether the step collapsed."""
-    physics, plane, weak = (
-        constants.physics,
-        constants.plane,
-        constants.physics._replace(gravity=constants.weak_gravity),
-    )
+    physics, plane, pace = constants.physics, constants.plane, constants.pace
+    weak = physics._replace(gravity=constants.weak_gravity)
     scale = 0.5 * float((physics.k_s * physics.rest**2).sum())  # energy of every spring at a strain of 1
-    before = np.inf
+    before, began, due = np.inf, 0.0, constants.window
+    history.append(_state(run, physics))
     while True:
-        began, left = run.clock[1], max_steps - run.counts[STEPS]
         pushing = weak if run.x[2].max() < plane.eps else physics
-        if not advance(run, scheme, pushing, plane, constants.dt, constants.dt_floor, min(WINDOW, left)):
+        n_steps = min(constants.stride, due - run.counts[STEPS], max_steps - run.counts[STEPS])
+        if not advance_by(run, integrator, pushing, plane, pace, n_steps):
             return Status.LOCKED, _COLLAPSED.format(dt=run.clock[0], steps=run.counts[STEPS]), True
-        energy = float(spring_energy(run.x, physics))
-        kinetic = 0.5 * physics.mass * float((run.v**2).sum())
+        history.append(_state(run, physics))
+        _, _, energy, kinetic, _, _ = history[-1]
         if not energy < RUNAWAY_STRAIN**2 * scale:  # NaN included
             return Status.DIVERGED, _REMEDY[Status.DIVERGED], False
+        spent = run.counts[STEPS] >= max_steps
+        if run.counts[STEPS] < due and not spent:
+            continue
         reference = max(energy, NEGLIGIBLE_STRAIN**2 * scale)
         # Two hundred tiny steps show no change either: the window must have lasted.
-        still = run.clock[1] - began >= SHORTEST_WINDOW * WINDOW * constants.dt
+        still = run.clock[1] - began >= SHORTEST_WINDOW * constants.window * pace.dt_max
         still = still and abs(energy - before) <= ENERGY_CHANGE * reference and kinetic <= KINETIC_SHARE * reference
-        before = energy
-        if still or run.counts[STEPS] >= max_steps:
+        before, began, due = energy, run.clock[1], due + constants.window
+        if still or spent:
             return *_outcome(run, springs, plane, still), False
+
+
+def advance_by(run: Run, integrator: Scheme | Outside, physics: System, plane: Plane, pace: Pace, n_steps: int) -> bool:
+    """Advance by whichever loop the integrator has; see :func:`.integrators.advance`."""
+    if isinstance(integrator, Outside):
+        return advance_outside(run, integrator, physics, plane, pace, n_steps)
+    return bool(advance(run, integrator, physics, plane, pace, n_steps))
+
+
+def _state(run: Run, physics: System) -> tuple[float, ...]:
+    """Return what the history holds, in its order."""
+    kinetic = 0.5 * physics.mass * float((run.v**2).sum())
+    potential = physics.mass * physics.gravity * float(run.x[2].sum())
+    spring = float(spring_energy(run.x, physics))
+    return float(run.clock[1]), float(run.counts[EVALUATIONS]), spring, kinetic, potential, float(run.x[2].max())
 
 
 def _outcome(run: Run, springs: Springs, plane: Plane, still: bool) -> tuple[Status, str]:
@@ -209,7 +258,7 @@ def _counters(run: Run, springs: Springs, constants: Constants) -> dict[str, flo
         "spring_energy": float(spring_energy(run.x, physics)),
         "kinetic_energy": 0.5 * physics.mass * float((run.v**2).sum()),
         "height_max_mm": float(run.x[2].max()),
-        "dt": constants.dt,
+        "dt": constants.pace.dt_max,
         "dt_smallest": float(run.clock[2]),
         "time": float(run.clock[1]),
         "k_d": physics.beta * springs.k_max,

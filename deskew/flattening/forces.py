@@ -87,8 +87,11 @@ def _pull(x, v, k_s, rest, beta, inverse_mass, tail, head, start, stop, pulls, s
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: ignore[no-untyped-def]
+def hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: ignore[no-untyped-def]
     """Add a chunk's pulls to its tails and subtract them from its heads (eq. 2)."""
+    # In the last rows the downward families end earlier than the rows do.
+    pulls[3:6, n_down:n_row] = 0.0
+    pulls[6:12, n_shear:n_row] = 0.0
     for axis in range(3):
         row, down = pulls[axis], pulls[3 + axis]
         falling, rising = pulls[6 + axis], pulls[9 + axis]
@@ -103,7 +106,7 @@ def _hand_out(pulls, start, n_row, n_down, n_shear, columns, out):  # type: igno
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _offsets(family, columns):  # type: ignore[no-untyped-def]
+def spring_offsets(family, columns):  # type: ignore[no-untyped-def]
     """Return where a family's springs begin and end, counted in vertices from the one that they are stored at."""
     steps = 1 if family < 4 else 2
     tail = steps * columns if family % 4 == 3 else 0
@@ -115,7 +118,7 @@ def _offsets(family, columns):  # type: ignore[no-untyped-def]
 def _pull_far(x, v, physics, inverse_mass, out):  # type: ignore[no-untyped-def]
     """Add what the springs of two steps do (eqs. 1 and 2); few use them, so they take the plain way."""
     for family in range(4, len(physics.k_s)):
-        tail, head = _offsets(family, physics.columns)
+        tail, head = spring_offsets(family, physics.columns)
         for i in range(x.shape[1] - max(tail, head)):
             k_s = physics.k_s[family, i]
             if k_s > 0.0:
@@ -130,6 +133,17 @@ def _pull_far(x, v, physics, inverse_mass, out):  # type: ignore[no-untyped-def]
                     pull = scale * inverse_mass * (x[axis, b] - x[axis, a])
                     out[axis, a] += pull
                     out[axis, b] -= pull
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _begin(v, physics, inverse_mass, start, stop, out):  # type: ignore[no-untyped-def]
+    """Write drag and downward acceleration of vertices start..stop."""
+    slowing = physics.drag * inverse_mass
+    for j in range(uintp(stop - start)):
+        i = j + uintp(start)
+        out[0, i] = -slowing * v[0, i]
+        out[1, i] = -slowing * v[1, i]
+        out[2, i] = -slowing * v[2, i] - physics.gravity
 
 
 @njit(cache=True, error_model="numpy")
@@ -150,23 +164,20 @@ def accelerate(x, v, physics, work, out):  # type: ignore[no-untyped-def]
     n, columns = x.shape[1], physics.columns
     rest, k_s, beta = physics.rest, physics.k_s, physics.beta
     inverse = 1.0 / physics.mass
-    slowing = physics.drag * inverse
-    for i in range(n):
-        out[0, i] = -slowing * v[0, i]
-        out[1, i] = -slowing * v[1, i]
-        out[2, i] = -slowing * v[2, i] - physics.gravity
-    for start in range(0, n - 1, CHUNK):
-        row = min(start + CHUNK, n - 1)
+    begun = 0
+    for start in range(0, n, CHUNK):
+        # Only now, so that what the chunk adds to is still in the cache.
+        reach = min(n, start + CHUNK + columns + 1)
+        _begin(v, physics, inverse, begun, reach, out)
+        begun = reach
+        row = max(start, min(start + CHUNK, n - 1))
         down = max(start, min(start + CHUNK, n - columns))
         shear = max(start, min(start + CHUNK, n - columns - 1))
         _pull(x, v, k_s[0], rest[0], beta, inverse, 0, 1, start, row, work, 0)
         _pull(x, v, k_s[1], rest[1], beta, inverse, 0, columns, start, down, work, 3)
         _pull(x, v, k_s[2], rest[2], beta, inverse, 0, columns + 1, start, shear, work, 6)
         _pull(x, v, k_s[3], rest[3], beta, inverse, columns, 1, start, shear, work, 9)
-        # In the last rows the downward families end earlier than the rows do.
-        work[3:6, down - start : row - start] = 0.0
-        work[6:12, shear - start : row - start] = 0.0
-        _hand_out(work, start, row - start, down - start, shear - start, columns, out)
+        hand_out(work, start, row - start, down - start, shear - start, columns, out)
     if len(k_s) > 4:
         _pull_far(x, v, physics, inverse, out)
 
@@ -185,7 +196,7 @@ def spring_energy(x, physics):  # type: ignore[no-untyped-def]
     n, columns = x.shape[1], physics.columns
     energy = 0.0
     for family in range(len(physics.k_s)):
-        tail, head = _offsets(family, columns)
+        tail, head = spring_offsets(family, columns)
         for i in range(n - max(tail, head)):
             k_s = physics.k_s[family, i]
             if k_s > 0.0:

@@ -1,16 +1,4 @@
-"""Integrators as tables of coefficients, and the one loop that steps them all (section 3.4).
-
-Every explicit scheme for x'' = a(x, x') that keeps only accelerations has the Runge-Kutta-Nystrom form
-
-    X_i = x + c_i h v + h^2 sum_j A_x[i, j] a_j        V_i = v + h sum_j A_v[i, j] a_j        a_i = a(X_i, V_i)
-    x'  = x +     h v + h^2 sum_j b_x[j] a_j           v'  = v + h sum_j b_v[j] a_j
-
-so a new integrator is a new table. A Runge-Kutta method (A, b) is the table with A_x = A A, b_x = b A, c = A 1.
-
-References
-----------
-.. [1] Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.14.
-"""
+"""The one loop that steps every integrator: stages, error control, contact, step halving (sections 3.3.2 and 3.4)."""
 
 from __future__ import annotations
 
@@ -21,42 +9,12 @@ from numba import njit, uintp
 
 from deskew.flattening.contact import GOOD_STEPS, collide, sunk
 from deskew.flattening.forces import accelerate, scratch
+from deskew.flattening.implicit import N_KRYLOV, implicit_euler
+from deskew.flattening.schemes import Scheme
 from deskew.types import Array
 
-
-class Scheme(NamedTuple):
-    """An explicit integrator of S stages.
-
-    Attributes
-    ----------
-    c : (S,) array
-        When each stage is evaluated, in steps.
-    A_x, A_v : (S, S) arrays
-        Strictly lower triangular weights of earlier accelerations in a stage's position and velocity.
-    b_x, b_v : (S,) arrays
-        Weights of the accelerations in the new position and velocity.
-    """
-
-    c: Array
-    A_x: Array
-    A_v: Array
-    b_x: Array
-    b_v: Array
-
-
-def runge_kutta(butcher: list[list[float]], weights: list[float]) -> Scheme:
-    """Make the scheme of an explicit Runge-Kutta method with Butcher coefficients A : (S, S) and weights b : (S,)."""
-    A, b = np.array(butcher), np.array(weights)
-    return Scheme(A.sum(axis=1), A @ A, A, b @ A, b)
-
-
-INTEGRATORS = {
-    "euler": runge_kutta([[0.0]], [1.0]),
-    "rk4": runge_kutta(
-        [[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]],
-        [1 / 6, 1 / 3, 1 / 3, 1 / 6],
-    ),
-}
+# What the next step of an embedded pair may be, in units of this one, and how cautiously it is aimed at (Hairer, II.4).
+_SHRINK, _GROW, _CAUTION = 0.2, 5.0, 0.9
 
 
 class Run(NamedTuple):
@@ -74,6 +32,8 @@ class Run(NamedTuple):
         Of the stages [mm/s^2].
     stage : (2, 3, V) array
         Position and velocity of the stage under way.
+    krylov : (N, 3, V) array
+        Vectors of the implicit solve; V is 0 for an explicit scheme.
     work : (12, CHUNK) array
         Scratch of the force pass.
     """
@@ -84,7 +44,24 @@ class Run(NamedTuple):
     counts: Array
     accelerations: Array
     stage: Array
+    krylov: Array
     work: Array
+
+
+class Pace(NamedTuple):
+    """Which steps a run may take.
+
+    Attributes
+    ----------
+    dt_max, dt_min : float
+        The step is halved from `dt_max`, but not below `dt_min` [s].
+    tolerance : float
+        Estimated error that a step may make in any coordinate [mm], and in velocity times step; of an embedded pair.
+    """
+
+    dt_max: float
+    dt_min: float
+    tolerance: float = 1.0
 
 
 STEPS, REJECTED, EVALUATIONS, CONTACTS, GOOD = range(5)
@@ -92,10 +69,11 @@ STEPS, REJECTED, EVALUATIONS, CONTACTS, GOOD = range(5)
 
 def start(vertices: Array, scheme: Scheme, dt: float) -> Run:
     """Make the arrays of a run that begins at rest at `vertices` : (..., 3) [mm] with step `dt` [s]."""
-    x = np.ascontiguousarray(vertices.reshape(-1, 3).T, dtype=np.float64)
+    x = np.array(vertices.reshape(-1, 3).T, dtype=np.float64, order="C")
     accelerations = np.zeros((len(scheme.c), *x.shape))
-    clock = np.array([dt, 0.0, dt])
-    return Run(x, np.zeros_like(x), clock, np.zeros(5, np.int64), accelerations, np.zeros((2, *x.shape)), scratch())
+    krylov = np.zeros((N_KRYLOV, 3, x.shape[1] if scheme.implicit else 0))
+    clock, counts = np.array([dt, 0.0, dt]), np.zeros(5, np.int64)
+    return Run(x, np.zeros_like(x), clock, counts, accelerations, np.zeros((2, *x.shape)), krylov, scratch())
 
 
 @njit(cache=True, error_model="numpy")
@@ -133,7 +111,78 @@ def _stages(run, scheme, physics, h, first):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def advance(run, scheme, physics, plane, dt_max, dt_min, n_steps):  # type: ignore[no-untyped-def]
+def _estimated_error(run, scheme, h):  # type: ignore[no-untyped-def]
+    """Largest difference to the embedded method in any coordinate, and in velocity times step [mm]."""
+    largest = 0.0
+    for axis in range(3):
+        for i in range(run.x.shape[1]):
+            in_place, in_motion = 0.0, 0.0  # of the acceleration
+            for j in range(scheme.c.shape[0]):
+                in_place += scheme.e_x[j] * run.accelerations[j, axis, i]
+                in_motion += scheme.e_v[j] * run.accelerations[j, axis, i]
+            error = h * h * max(abs(in_place), abs(in_motion))
+            if not error <= largest:  # NaN is an error, too
+                largest = error
+    return largest
+
+
+@njit(cache=True, error_model="numpy")
+def _propose(run, scheme, physics, plane, h, first):  # type: ignore[no-untyped-def]
+    """Write the new positions into stage[0]; those of an implicit step with the new velocities in stage[1]."""
+    if scheme.implicit:
+        run.counts[EVALUATIONS] += implicit_euler(run, physics, plane, h)
+        return
+    _stages(run, scheme, physics, h, first)
+    X = run.stage[0]
+    _sum(run.x, h, run.v, X)
+    for j in range(scheme.c.shape[0]):
+        if scheme.b_x[j] != 0.0:
+            _sum(X, scheme.b_x[j] * h * h, run.accelerations[j], X)
+
+
+@njit(cache=True, error_model="numpy")
+def _accept(run, scheme, h):  # type: ignore[no-untyped-def]
+    """Make the proposed state the state."""
+    _copy(run.stage[0], run.x)
+    if scheme.implicit:
+        _copy(run.stage[1], run.v)
+        return
+    for j in range(scheme.c.shape[0]):
+        if scheme.b_v[j] != 0.0:
+            _sum(run.v, scheme.b_v[j] * h, run.accelerations[j], run.v)
+
+
+@njit(cache=True, error_model="numpy")
+def reject(run, dt, pace):  # type: ignore[no-untyped-def]
+    """Have the step made again in `dt` [s]."""
+    run.clock[0] = max(dt, pace.dt_min)
+    run.counts[REJECTED] += 1
+    run.counts[GOOD] = 0
+
+
+@njit(cache=True, error_model="numpy")
+def finish(run, physics, plane, pace, h, growth):  # type: ignore[no-untyped-def]
+    """Collide with the plane, count the step of `h` [s], choose the next; return how many particles struck.
+
+    An error estimate lets the next step be `growth` times this one; 0 stands for none: halved steps double again.
+    """
+    struck = collide(run.x[2], run.v[2], plane, physics.gravity, h)
+    run.counts[CONTACTS] += struck
+    run.counts[STEPS] += 1
+    run.counts[GOOD] += 1
+    run.clock[1] += h
+    run.clock[2] = min(run.clock[2], h)
+    may_grow = run.counts[GOOD] >= GOOD_STEPS and not plane.literal
+    if growth > 0.0:
+        run.clock[0] = min(h * min(growth, _GROW if may_grow else 1.0), pace.dt_max)
+    elif h < pace.dt_max and may_grow:
+        run.clock[0] = min(2 * h, pace.dt_max)
+        run.counts[GOOD] = 0
+    return struck
+
+
+@njit(cache=True, error_model="numpy")
+def advance(run, scheme, physics, plane, pace, n_steps):  # type: ignore[no-untyped-def]
     """Make `n_steps` accepted steps.
 
     Parameters
@@ -146,8 +195,8 @@ def advance(run, scheme, physics, plane, dt_max, dt_min, n_steps):  # type: igno
         What exerts force.
     plane : Plane
         What the particles collide with.
-    dt_max, dt_min : float
-        The step is halved from `dt_max` but not below `dt_min` [s].
+    pace : Pace
+        Limits of the step.
     n_steps : int
         Steps to accept.
 
@@ -156,35 +205,31 @@ def advance(run, scheme, physics, plane, dt_max, dt_min, n_steps):  # type: igno
     bool
         False if literal halving collapsed: the step fell under `dt_min` and no step was acceptable.
     """
-    X = run.stage[0]
     first = 0
     target = run.counts[STEPS] + n_steps
     while run.counts[STEPS] < target:
         h = run.clock[0]
-        _stages(run, scheme, physics, h, first)
+        _propose(run, scheme, physics, plane, h, first)
         first = 1  # stage 0 does not depend on the step: a rejected one does not void it
-        _sum(run.x, h, run.v, X)
-        for j in range(scheme.c.shape[0]):
-            if scheme.b_x[j] != 0.0:
-                _sum(X, scheme.b_x[j] * h * h, run.accelerations[j], X)
-        if sunk(X[2], plane) > 0:
-            if h > dt_min:
-                run.clock[0] = h / 2
-                run.counts[REJECTED] += 1
-                run.counts[GOOD] = 0
+        growth = 0.0
+        if scheme.estimate > 0:
+            error = _estimated_error(run, scheme, h) / pace.tolerance
+            growth = _SHRINK
+            if error >= 0.0:
+                growth = max(_SHRINK, _CAUTION * max(error, 1e-12) ** (-1.0 / (scheme.estimate + 1)))
+            if not error <= 1.0 and h > pace.dt_min:
+                reject(run, h * growth, pace)
+                continue
+        if sunk(run.stage[0][2], plane) > 0:
+            if h > pace.dt_min:
+                reject(run, h / 2, pace)
                 continue
             if plane.literal:
                 return False
-        _copy(X, run.x)
-        for j in range(scheme.c.shape[0]):
-            _sum(run.v, scheme.b_v[j] * h, run.accelerations[j], run.v)
-        run.counts[CONTACTS] += collide(run.x[2], run.v[2], plane, physics.gravity, h)
+        _accept(run, scheme, h)
+        struck = finish(run, physics, plane, pace, h, growth)
         first = 0
-        run.counts[STEPS] += 1
-        run.counts[GOOD] += 1
-        run.clock[1] += h
-        run.clock[2] = min(run.clock[2], h)
-        if h < dt_max and run.counts[GOOD] >= GOOD_STEPS and not plane.literal:
-            run.clock[0] = min(2 * h, dt_max)
-            run.counts[GOOD] = 0
+        if scheme.reuses and struck == 0:
+            _copy(run.accelerations[scheme.c.shape[0] - 1], run.accelerations[0])
+            first = 1
     return True

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-from deskew.errors import DeskewError, InputError, StepError, in_one_line, require
+from deskew.errors import DeskewError, StepError, in_one_line, require
 from deskew.flattening.dynamics import settle
-from deskew.flattening.integrators import INTEGRATORS
+from deskew.flattening.outside import Outside
 from deskew.flattening.peers import PEERS
+from deskew.flattening.plugins import load_function
+from deskew.flattening.schemes import INTEGRATORS, Scheme
 from deskew.flattening.settings import ParticleSettings, settings_of
 from deskew.flattening.spring import flatten_spring
 from deskew.types import Flattened, Sheet, Status
@@ -19,8 +20,36 @@ from deskew.types import Flattened, Sheet, Status
 Flattener = Callable[..., Flattened]
 
 
-def _particles(integrator: str) -> Flattener:
-    """Make the paper's method out of an integrator's name."""
+def find_integrator(name: str) -> Scheme | Outside:
+    """Look an integrator up: a key of `INTEGRATORS`, or `package.module:function` for a `Step` of :mod:`.outside`.
+
+    Raises
+    ------
+    InputError
+        If there is no such integrator.
+    """
+    known = f"one of {', '.join(INTEGRATORS)}, or package.module:function"
+    require(isinstance(name, str), "integrator", f"be {known}", repr(name))
+    return INTEGRATORS[name] if name in INTEGRATORS else Outside(name, load_function(name, "integrator", known))
+
+
+def flatten_particles(sheet: Sheet, *, integrator: str = "euler", **settings: object) -> Flattened:
+    """Flatten a grid by the particle system of section 3 with any integrator.
+
+    Parameters
+    ----------
+    sheet : Sheet
+        Grid [mm].
+    integrator : str
+        As of `find_integrator`.
+    **settings
+        Fields of `ParticleSettings`.
+    """
+    return settle(sheet, find_integrator(integrator), settings_of(ParticleSettings, "the particle system", settings))
+
+
+def _paper(integrator: str) -> Flattener:
+    """Make the paper's method out of one of its integrators' names."""
 
     def flatten_with(sheet: Sheet, **settings: object) -> Flattened:
         return settle(sheet, INTEGRATORS[integrator], settings_of(ParticleSettings, "the particle system", settings))
@@ -42,8 +71,9 @@ def _peer(name: str) -> Flattener:
 
 METHODS: dict[str, Flattener] = {
     "spring": flatten_spring,
-    "paper_euler": _particles("euler"),
-    "paper_rk4": _particles("rk4"),
+    "paper_euler": _paper("euler"),
+    "paper_rk4": _paper("rk4"),
+    "particles": flatten_particles,
     **{name: _peer(name) for name in PEERS},
 }
 
@@ -66,18 +96,7 @@ def find_method(name: str) -> Flattener:
     """
     known = f"one of {', '.join(METHODS)}, or package.module:function"
     require(isinstance(name, str), "method", f"be {known}", repr(name))
-    if name in METHODS:
-        return METHODS[name]
-    module_name, colon, attribute = name.partition(":")
-    absolute = bool(colon and attribute) and all(module_name.split("."))
-    require(absolute, "method", f"be {known}", repr(name))
-    try:
-        found: Any = getattr(import_module(module_name), attribute, None)
-    except (Exception, SystemExit) as error:  # whatever a module does when it is imported, exiting included
-        raise InputError(f"`method` must be {known}, got {name!r}: {in_one_line(error)}.") from error
-    require(callable(found), "method", f"name a function in {module_name}", repr(name))
-    function: Flattener = found
-    return function
+    return METHODS[name] if name in METHODS else load_function(name, "method", known)
 
 
 def flatten(sheet: Sheet, *, method: str = DEFAULT, **settings: object) -> Flattened:
@@ -89,7 +108,8 @@ def flatten(sheet: Sheet, *, method: str = DEFAULT, **settings: object) -> Flatt
         The surface in the world [mm].
     method : str
         `spring` (the same springs solved for rest at once), `paper_euler` or `paper_rk4` (the paper's particle system,
-        section 3), `lscm`, `arap` or `slim` of libigl, if it is installed, or `package.module:function`.
+        section 3), `particles` (the same with any `integrator`), `lscm`, `arap` or `slim` of libigl, if it is
+        installed, or `package.module:function`.
     **settings
         Of the method: the fields of `StaticSettings` for `spring`, of `ParticleSettings` for the particle system.
 

@@ -122,13 +122,18 @@ class ParticleSettings:
     k_s : float
         Spring constant [kg/s^2], > 0; only its ratio to the other constants matters. A sheet's own `stiffness` wins.
     k_d : float or None
-        Spring damping [kg/s], >= 0, of the stiffest spring; softer ones have the same k_d / k_s. None: 0.8 of what
-        damps the stiffest mode critically, where explicit Euler may take nearly its longest step.
+        Spring damping [kg/s], >= 0, of the stiffest spring; softer ones have the same k_d / k_s. None: `damping_ratio`
+        of what damps the stiffest mode critically.
+    damping_ratio : float
+        Where k_d is None, in [0, 100]; at the default explicit Euler may take nearly its longest step.
     mass : float
         Of one particle [kg], > 0; the default is 80 g/m^2 paper shared out over 45x45 particles.
     gravity : float or None
-        Downward acceleration [mm/s^2], >= 0. None: m g = 0.5 k r for the mean structural spring, of length r and the
-        largest constant k. A hundredth of it leaves half of all pages locked in small buckles.
+        Downward acceleration [mm/s^2], >= 0. None: m g = `push` k r for the mean structural spring, of length r and the
+        largest constant k.
+    push : float
+        Where gravity is None, in [0, 1000]. A hundredth of the default leaves half of all pages locked in small
+        buckles.
     weak_gravity : float or None
         The same once the whole sheet lies within eps of the plane [mm/s^2], >= 0: a strong push flattens, a weak one
         lets the sheet settle. None: what makes a particle sink eps / 4 in a step, but no more than `gravity`. One
@@ -146,14 +151,22 @@ class ParticleSettings:
         Steps after which the sheet counts as locked, in [1, 1e9].
     halving : str
         Reading of the paper's step halving, "working" or "literal" (see `contact`).
+    tolerance_mm : float
+        Error that an embedded pair may estimate for a step of any coordinate [mm], > 0; it chooses its steps by that,
+        up to `dt`. Other integrators make equal steps.
+    stride : int or None
+        Steps after which the run's `history` gets an entry, in [1, 1e9]. None: as often as the sheet is looked at for
+        rest, every 200 steps, and 50 of implicit Euler.
     rest, bending, more
         As in `SpringSettings`.
     """
 
     k_s: float = 1.0
     k_d: float | None = None
+    damping_ratio: float = 0.8
     mass: float = 2.4e-6
     gravity: float | None = None
+    push: float = 0.5
     weak_gravity: float | None = None
     drag: float | None = None
     k_r: float = 0.1
@@ -161,13 +174,15 @@ class ParticleSettings:
     eps_mm: float = 0.05
     max_steps: int = 40_000
     halving: str = "working"
+    tolerance_mm: float = 1e-3
+    stride: int | None = None
     rest: str = "chord"
     bending: float = 0.0
     more: float = 0.0
 
     def __post_init__(self) -> None:
         _ = self.springs
-        for name, unit in (("mass", "kg"), ("eps_mm", "mm"), ("dt", "s")):
+        for name, unit in (("mass", "kg"), ("eps_mm", "mm"), ("tolerance_mm", "mm"), ("dt", "s")):
             value = getattr(self, name)
             if name != "dt" or value is not None:
                 require_constant(name, value, unit)
@@ -176,8 +191,12 @@ class ParticleSettings:
             if value is not None:
                 allowed = _is_number(value) and 0 <= value <= LARGEST
                 require(allowed, name, f"be a number in [0, {LARGEST:g}] [{unit}]", repr(value))
-        require(_is_number(self.k_r) and 0 <= self.k_r <= 1, "k_r", "be in [0, 1]", repr(self.k_r))
+        for name, most in (("k_r", 1), ("damping_ratio", 100), ("push", 1000)):
+            value = getattr(self, name)
+            require(_is_number(value) and 0 <= value <= most, name, f"be in [0, {most}]", repr(value))
         require_whole("max_steps", self.max_steps, 1, MAX_STEPS)
+        if self.stride is not None:
+            require_whole("stride", self.stride, 1, MAX_STEPS)
         require(self.halving in READINGS, "halving", f"be one of {', '.join(READINGS)}", repr(self.halving))
 
     @property

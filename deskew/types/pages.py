@@ -143,6 +143,8 @@ class Flattened:
         whatever the method counts.
     surface : array of the shape of the sheet's `surface`, or None
         Final places of the surface inside the grid's quads [mm], where the method follows it there.
+    history : mapping of name to (n,) array
+        How the run went, where the method has a course in time: `time_s`, energies [uJ], ...
     """
 
     vertices: Floats
@@ -150,6 +152,7 @@ class Flattened:
     remedy: str = ""
     counters: Mapping[str, float] = field(default_factory=dict)
     surface: Floats | None = None
+    history: Mapping[str, Floats] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,32 @@ Only the layout is offered here, because each worker imports it with its study; 
 the driver from its own module.
 """
 
-from experiments.reporting.layout import Column, Curve, FigurePage, Layout, Montage, Numbers, Plot, Section, Times
+from experiments.reporting.layout import (
+    Column,
+    Curve,
+    Diagram,
+    FigurePage,
+    Layout,
+    Montage,
+    Numbers,
+    Panel,
+    Plot,
+    Section,
+    Shares,
+    Times,
+)
 
-__all__ = ["Column", "Curve", "FigurePage", "Layout", "Montage", "Numbers", "Plot", "Section", "Times"]
+__all__ = [
+    "Column",
+    "Curve",
+    "Diagram",
+    "FigurePage",
+    "Layout",
+    "Montage",
+    "Numbers",
+    "Panel",
+    "Plot",
+    "Section",
+    "Shares",
+    "Times",
+]

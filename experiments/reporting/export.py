@@ -14,6 +14,7 @@ from typing import Any
 
 from deskew.errors import StepError, require
 from experiments.reporting.curves import curve_plot
+from experiments.reporting.diagrams import diagram_plot, shares_plot
 from experiments.reporting.figure_pages import figure_page, pictures_on
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.layout import Layout
@@ -45,33 +46,34 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
     }
     if layout.profile is not None:
         files["profile.md"] = times_page(layout.profile, results.timings).encode()
-    for plot in layout.plots:
-        figure = dot_plot(plot, results.rows)
-        if figure is not None:
-            files[f"figures/{plot.name}.png"] = png_bytes(figure)
-    for curve in layout.curves:
-        figure = curve_plot(curve, results.rows)
-        if figure is not None:
-            files[f"figures/{curve.name}.png"] = png_bytes(figure)
-    shown = set()
-    for montage in layout.montages:
-        wall = picture_wall(montage, results.pictures)
-        if wall is not None:
-            files[f"figures/{montage.name}.png"] = png_bytes(wall)
-        shown |= {name.format(trial=row.trial) for _, name in montage.lines for row in results.rows}
-    for page in layout.pages:
-        png = figure_page(page, layout.columns, results.rows, results.pictures)
-        if png is not None:
-            files[f"figures/{page.name}.png"] = png
-        shown |= pictures_on(page, results.rows)
-    alone = {name: png for name, png in results.pictures.items() if name not in shown}
-    files |= {f"figures/{name}.png": png for name, png in alone.items()}
+    files |= {f"figures/{name}.png": png for name, png in _figures(layout, results).items()}
     _replace_all(out, files)
+
+
+def _figures(layout: Layout, results: Results) -> dict[str, bytes]:
+    """Draw what the layout asks for, and add the recorded pictures that stand in no figure: PNG by name."""
+    rows, pictures = results.rows, results.pictures
+    timed = [*rows, *results.timings]
+    drawn = [
+        *((plot.name, dot_plot(plot, rows)) for plot in layout.plots),
+        *((curve.name, curve_plot(curve, rows)) for curve in layout.curves),
+        *((diagram.name, diagram_plot(diagram, timed)) for diagram in layout.diagrams),
+        *((shares.name, shares_plot(shares, rows)) for shares in layout.shares),
+        *((montage.name, picture_wall(montage, pictures)) for montage in layout.montages),
+    ]
+    pages = [(page.name, figure_page(page, layout.columns, rows, pictures)) for page in layout.pages]
+    shown = {n.format(trial=row.trial) for montage in layout.montages for _, n in montage.lines for row in rows}
+    shown = shown.union(*(pictures_on(page, rows) for page in layout.pages))
+    return (
+        {name: png_bytes(figure) for name, figure in drawn if figure is not None}
+        | {name: png for name, png in pages if png is not None}
+        | {name: png for name, png in pictures.items() if name not in shown}
+    )
 
 
 def require_targets(out: Path, layout: Layout) -> None:
     """Raise an InputError where a report could not be written under `out`: to be asked before the trials."""
-    figures = (layout.plots, layout.curves, layout.montages, layout.pages)
+    figures = (layout.plots, layout.curves, layout.diagrams, layout.shares, layout.montages, layout.pages)
     drawn = [item.name for kind in figures for item in kind]
     names = [
         "results.csv",

@@ -91,6 +91,75 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
+class Panel:
+    """A pair of axes, logarithmic unless said otherwise: a line a method, its points the medians of conditions.
+
+    Attributes
+    ----------
+    conditions : tuple of (beginning, text)
+        The conditions that are points, joined in the order of the number after their last "="; the text is added to
+        the method's name, so that each beginning is a line of its own.
+    x, y : str
+        Metrics of results or timings; an empty x stands for that number.
+    x_label, y_label : str
+        How the axes are called, with the unit.
+    theory : str
+        A metric drawn as a broken line of the same colour; "" for none.
+    levels : tuple of (text, condition, metric)
+        Broken lines across, at a metric's median under method "-".
+    linear : bool
+        Plain axes.
+    """
+
+    conditions: tuple[tuple[str, str], ...]
+    x: str
+    y: str
+    x_label: str
+    y_label: str
+    theory: str = ""
+    levels: tuple[tuple[str, str, str], ...] = ()
+    linear: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Diagram:
+    """A figure of panels side by side, with one legend.
+
+    Attributes
+    ----------
+    name, title : str
+        Written as `figures/NAME.png`, and what stands above.
+    panels : tuple of Panel
+        From left to right.
+    """
+
+    name: str
+    title: str
+    panels: tuple[Panel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """A figure of outcomes: for each method a bar a condition, divided by the share of its trials that ended so.
+
+    Attributes
+    ----------
+    name, title, label : str
+        Written as `figures/NAME.png`, what stands above, and what the bars' numbers are.
+    conditions : str
+        Beginning of the conditions; the bars are numbered by what follows the last "=".
+    metrics : tuple of (metric, colour)
+        Metrics that are 0 or 1 a trial, from the bottom up.
+    """
+
+    name: str
+    title: str
+    label: str
+    conditions: str
+    metrics: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Montage:
     """A figure of pictures: a column a trial, a line a kind of picture.
 
@@ -178,7 +247,8 @@ class Section:
     title, note : str
         Heading and the sentences under it.
     conditions : tuple of str
-        A line each, in this order; one without data has none. One that ends with "/" stands for all that go on there.
+        A line each, in this order; one without data has none. One that ends with "/" or "=" stands for all that go
+        on there.
     metrics : tuple of str
         A column each, in the layout's order; one without data has none.
     absent : str
@@ -194,7 +264,7 @@ class Section:
     def rank(self, condition: str) -> int | None:
         """Return the place of a condition from the top, None if it is none of this section's."""
         for place, wanted in enumerate(self.conditions):
-            if condition == wanted or (wanted.endswith("/") and condition.startswith(wanted)):
+            if condition == wanted or (wanted.endswith(("/", "=")) and condition.startswith(wanted)):
                 return place
         return None
 
@@ -243,6 +313,10 @@ class Layout:
         Printed pages of pictures and numbers.
     curves : tuple of Curve
         Figures of one metric against another.
+    diagrams : tuple of Diagram
+        Figures of panels, times included.
+    shares : tuple of Shares
+        Figures of outcomes.
     """
 
     title: str
@@ -255,3 +329,5 @@ class Layout:
     profile: Times | None = None
     pages: tuple[FigurePage, ...] = ()
     curves: tuple[Curve, ...] = ()
+    diagrams: tuple[Diagram, ...] = ()
+    shares: tuple[Shares, ...] = ()

@@ -17,6 +17,7 @@ STUDIES = {
     "stiffness": "experiments.studies.stiffness:Stiffness",
     "real_boards": "experiments.studies.real_boards:RealBoards",
     "surfaces": "experiments.studies.surfaces:Surfaces",
+    "integrators": "experiments.studies.integrators:Integrators",
     "speed": "experiments.studies.speed:Speed",
 }
 

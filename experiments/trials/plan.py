@@ -16,7 +16,13 @@ from experiments.trials.schema import TrialKey
 # What is ablated stands in the trial's own key.
 _NO_PART_OF_A_ROW = ("engine", "out", "budget", "trials", "trials_at", "ablations")
 # Keys that belong to one experiment only.
-_SECTIONS = {"real_boards": "real_boards", "stiffness": "stiffness", "surfaces": "surfaces", "ocr": "ocr_misses"}
+_SECTIONS = {
+    "real_boards": "real_boards",
+    "stiffness": "stiffness",
+    "surfaces": "surfaces",
+    "ocr": "ocr_misses",
+    "integrators": "integrators",
+}
 # Sources that rows come from; reporting and the program around it change no row.
 SOURCES = (
     "deskew",

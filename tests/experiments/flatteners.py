@@ -1,12 +1,13 @@
-"""Methods under test for the study of surfaces, which know that their sheet is a cylinder of 25 mm about Y."""
+"""Methods under test that know that their sheet is a cylinder of 25 mm about Y, and an integrator that is none."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from deskew.types import Flattened, Floats, Sheet, Status
+from deskew.types import Array, Flattened, Floats, Sheet, Status
 
 NOISE_SEEN: list[float] = []
 
@@ -35,3 +36,8 @@ def fold(sheet: Sheet) -> Flattened:
 
 def mirror(sheet: Sheet) -> Flattened:
     return Flattened(_unrolled(sheet) * [-1.0, 1.0, 1.0], Status.AT_REST)
+
+
+def stand_still(x: Array, v: Array, acceleration: Callable[[Array, Array], Array], dt: float) -> tuple[Array, Array]:
+    """Step nowhere: an integrator that is none."""
+    return x, v

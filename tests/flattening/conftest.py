@@ -8,7 +8,8 @@ import pytest
 
 from deskew.flattening.contact import Plane
 from deskew.flattening.forces import System
-from deskew.flattening.integrators import INTEGRATORS, STEPS, Run, advance, start
+from deskew.flattening.integrators import STEPS, Pace, Run, advance, start
+from deskew.flattening.schemes import INTEGRATORS
 from deskew.types import Array
 
 
@@ -22,7 +23,7 @@ def make_steps() -> Callable[..., Run]:
         scheme = INTEGRATORS[integrator]
         run = start(vertices, scheme, dt)
         run.v[:] = velocities.reshape(-1, 3).T
-        assert advance(run, scheme, physics, plane, dt, dt, n)
+        assert advance(run, scheme, physics, plane, Pace(dt, dt, 1e9), n)
         assert run.counts[STEPS] == n
         return run
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from deskew.flattening.contact import Plane, collide, sunk
-from deskew.flattening.integrators import CONTACTS, INTEGRATORS, REJECTED, Run, advance, start
+from deskew.flattening.integrators import CONTACTS, REJECTED, Pace, Run, advance, start
+from deskew.flattening.schemes import INTEGRATORS
 from tests.flattening.bent_sheets import free_particles
 
 
@@ -52,7 +53,9 @@ def fallen_balls(literal: bool, eps: float, n_steps: int) -> tuple[bool, Run]:
     """Let two balls fall on the plane with halving allowed down to 1e-12 of the step."""
     scheme, dt = INTEGRATORS["euler"], 0.05
     run = start(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.4]]), scheme, dt)
-    goes_on = advance(run, scheme, free_particles(2, 10.0, 0.5), Plane(eps, 0.1, literal), dt, 1e-12 * dt, n_steps)
+    goes_on = advance(
+        run, scheme, free_particles(2, 10.0, 0.5), Plane(eps, 0.1, literal), Pace(dt, 1e-12 * dt), n_steps
+    )
     return bool(goes_on), run
 
 
@@ -76,7 +79,7 @@ def test_rejected_step_leaves_the_state_and_halves() -> None:
     scheme = INTEGRATORS["euler"]
     run = start(np.array([[0.0, 0.0, 1.0]]), scheme, 1.0)
     run.v[2] = -1.6
-    advance(run, scheme, free_particles(1, 0.0), Plane(0.05, 0.1, False), 1.0, 1e-3, 1)
+    advance(run, scheme, free_particles(1, 0.0), Plane(0.05, 0.1, False), Pace(1.0, 1e-3), 1)
     assert run.counts[REJECTED] == 1
     assert run.clock[2] == 0.5
     assert run.x[2, 0] == pytest.approx(0.2)

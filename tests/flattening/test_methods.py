@@ -70,7 +70,7 @@ def test_function_from_outside_plugs_in_by_its_name(plugin: str) -> None:
 def test_unknown_method_lists_the_known_ones(name: Any) -> None:
     with pytest.raises(
         InputError,
-        match=r"`method` must be one of spring, paper_euler, paper_rk4, lscm, arap, slim, or package\.module:function",
+        match=r"`method` must be one of spring, paper_euler, paper_rk4, particles, lscm, arap, slim, or package\.mod",
     ):
         flatten(Sheet(flat_grid()), method=name)
 

@@ -3,9 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from deskew.flattening.contact import Plane
+from deskew.flattening.contact import NOWHERE
 from deskew.flattening.forces import spring_energy, system
-from deskew.flattening.integrators import INTEGRATORS, advance, start
+from deskew.flattening.integrators import Pace, advance, start
+from deskew.flattening.schemes import INTEGRATORS
 from deskew.flattening.settings import SpringSettings
 from deskew.flattening.springs import grid_springs
 from deskew.flattening.stability import largest_stable_step, stiffest_mode
@@ -51,7 +52,16 @@ def test_undamped_rk4_is_stable_to_two_root_two() -> None:
     assert largest_stable_step(INTEGRATORS["rk4"], 9.0, 0.0, 0.0) == pytest.approx(2 * np.sqrt(2) / 3, rel=1e-3)
 
 
-@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+def test_undamped_leapfrogs_are_stable_to_two() -> None:
+    for integrator in ("symplectic_euler", "verlet"):
+        assert largest_stable_step(INTEGRATORS[integrator], 9.0, 0.0, 0.0) == pytest.approx(2 / 3, rel=1e-3)
+
+
+def test_implicit_euler_has_no_longest_step() -> None:
+    assert largest_stable_step(INTEGRATORS["implicit_euler"], 9.0, 0.1, 0.0) == np.inf
+
+
+@pytest.mark.parametrize("integrator", [name for name in INTEGRATORS if name != "implicit_euler"])
 @pytest.mark.parametrize("ratio", [0.3, 0.8])
 def test_measured_limit_is_the_predicted_one(integrator: str, ratio: float) -> None:
     rest = flat_grid((8, 8))
@@ -68,7 +78,7 @@ def test_measured_limit_is_the_predicted_one(integrator: str, ratio: float) -> N
         dt = share * limit
         run.clock[:] = dt, 0.0, dt
         before = spring_energy(run.x, physics)
-        advance(run, INTEGRATORS[integrator], physics, Plane(-1e9, 0.1, False), dt, dt, 1200)
+        advance(run, INTEGRATORS[integrator], physics, NOWHERE, Pace(dt, dt, 1e9), 1200)
         energies[share] = spring_energy(run.x, physics) / before
     assert energies[0.96] < 1e-2
     assert not energies[1.04] < 1e3  # NaN where it overflowed
