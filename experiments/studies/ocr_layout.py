@@ -110,7 +110,9 @@ LAYOUT = Layout(
             "Image metrics",
             "What the document-unwarping field reports, from pictures alone, against the control (docs/adr/0026). LD, "
             "AD and Li-D are by DIS flow, not by the field's SIFT flow, and in pixels of pictures of 149,600 pixels. "
-            "`null/shifted` is the control itself moved by one pixel: what a metric reads of a truth that is spoilt.",
+            "MS-SSIM and LD count where the page lies in the picture, which no method is asked to know; AD, Li-D and "
+            "the lines count its shape. `null/shifted` is the control itself moved by one pixel: what a metric reads "
+            "of a truth that is spoilt.",
             ("control", "null/shifted", "unrestored", "ideal", "restored"),
             _IMAGE,
         ),
