@@ -296,6 +296,32 @@ class IntegratorsSettings(Checked):
 
 
 @dataclass
+class SettlingSettings(Checked):
+    """The paper's particle system on crumpled pages, one of its constants changed at a time.
+
+    `restitutions`: coefficients k_r. `stiffer`: what k_s is multiplied by.
+    `pushes`: weight of a vertex over k_s times a spring's length.
+    `max_steps`: after which a page counts as unfinished; the usual one needs a tenth of them.
+    """
+
+    group: ClassVar[str] = "settling."
+    restitutions: list[float] = setting(
+        [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0],
+        "be a list of different numbers in [0, 1]",
+        lambda values: _numbers(values, 0.0, 1.0),
+    )
+    stiffer: list[float] = setting(
+        [2.0, 20.0, 200.0], "be a list of different numbers in [1, 10000]", lambda values: _numbers(values, 1.0, 1e4)
+    )
+    pushes: list[float] = setting(
+        [0.002, 0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5.0],
+        "be a list of different numbers in [0.00001, 100]",
+        lambda values: _numbers(values, 1e-5, 100.0),
+    )
+    max_steps: int = count(10_000, 200, 1_000_000)
+
+
+@dataclass
 class DecodersSettings(Checked):
     """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
 
@@ -353,6 +379,7 @@ class Config(Checked):
     scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
     integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
+    settling: SettlingSettings = field(default_factory=SettlingSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ocr: ReadingSettings = field(default_factory=ReadingSettings)
