@@ -22,6 +22,8 @@ _SECTIONS = {
     "surfaces": "surfaces",
     "ocr": "ocr_misses",
     "integrators": "integrators",
+    "settling": "settling",
+    "culling": "culling",
 }
 # Sources that rows come from; reporting and the program around it change no row.
 SOURCES = (

@@ -89,7 +89,9 @@ def test_real_boards_refuse_other_captures(tmp_path: Path, capsys: pytest.Captur
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", ["ablations", "corner_distance", "plane_accuracy", "real_boards", "speed"])
+@pytest.mark.parametrize(
+    "name", ["ablations", "corner_distance", "culling", "plane_accuracy", "real_boards", "settling", "speed"]
+)
 def test_every_study_documents_its_conditions(name: str) -> None:
     study = find_study(name)
     assert "Conditions\n" in str(type(study).__doc__)
