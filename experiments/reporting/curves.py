@@ -9,7 +9,7 @@ from statistics import fmean
 
 from matplotlib.figure import Figure
 
-from experiments.reporting.layout import Curve
+from experiments.reporting.figure_layout import Curve
 from experiments.reporting.statistics import Summary, summarise
 from experiments.trials.schema import Row
 
