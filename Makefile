@@ -39,6 +39,7 @@ reproduce: $(EXPERIMENTS) ## run every experiment and regenerate reports/ (BUDGE
 
 $(EXPERIMENTS): $(STAMP)
 	@$(BIN)/python -m experiments experiment=$(patsubst %_physical,%,$(@:_noisy=)) budget=$(BUDGET) out=$(REPORTS)/$@ \
+		calibrations=out/calibrations \
 		$(if $(filter %_noisy,$@),surfaces.noise_mm=0.3) \
 		$(if $(filter %_physical,$@),sheet=physical $(if $(filter smoke,$(BUDGET)),,trials=8)) \
 		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)')) \

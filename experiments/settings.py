@@ -345,6 +345,12 @@ class Config(Checked):
     out: str | None = setting(
         None, "be the name of a folder, without line breaks", lambda value: value is None or value.isprintable()
     )
+    # Experiments on one rig need not calibrate it again and again.
+    calibrations: str | None = setting(
+        None,
+        "be the name of a folder for calibrations that other runs may use, or null",
+        lambda value: value is None or (value.isprintable() and value != ""),
+    )
     budget: BudgetSettings = field(default_factory=BudgetSettings)
     engine: EngineSettings = field(default_factory=EngineSettings)
     sheet: SheetSettings = field(default_factory=SheetSettings)

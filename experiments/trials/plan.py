@@ -14,7 +14,7 @@ from experiments.trials.schema import TrialKey
 
 # What decides where and how much is computed, and never the value of a row. `trials` may grow: old rows stay good.
 # What is ablated stands in the trial's own key.
-_NO_PART_OF_A_ROW = ("engine", "out", "budget", "trials", "trials_at", "ablations")
+_NO_PART_OF_A_ROW = ("engine", "out", "calibrations", "budget", "trials", "trials_at", "ablations")
 # Keys that belong to one experiment only.
 _SECTIONS = {
     "real_boards": "real_boards",

@@ -18,7 +18,7 @@ from deskew import metrics
 from deskew.metrics import ocr
 from deskew.types import Calibration
 from experiments.program import main
-from experiments.settings import Config
+from experiments.settings import BudgetSettings, Config, PageSettings, ReadingSettings
 from experiments.studies import ocr_misses
 from experiments.studies.bench import Bench
 
@@ -53,6 +53,15 @@ def photographs(tmp_path: Path) -> Path:
     cv2.imwrite(str(folder / "warped_document_crumpleshard_bright.jpg"), np.zeros((140, 320), np.uint8))
     (folder / "ground_truth_words.json").write_text(json.dumps([{"text": word} for word in WORDS]))
     return folder.parent
+
+
+@pytest.mark.parametrize(("budget", "n"), [("smoke", 1), ("paper", 2), ("full", 2)])
+def test_smoke_reads_one_further_severity(budget: str, n: int) -> None:
+    size, page = BudgetSettings(budget), PageSettings("lettered")
+    reading = ReadingSettings(severities=[30.0, 40.0])
+    config = Config("ocr_misses", trials=2, method="spring", budget=size, page=page, ocr=reading)
+    conditions = [key.condition for key in ocr_misses.OcrMisses().plan(config)]
+    assert conditions == ["-"] * 2 + [f"slope={slope}" for slope in (30, 40)[:n] for _ in range(2)]
 
 
 @pytest.fixture
