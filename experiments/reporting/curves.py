@@ -59,6 +59,8 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
     axes = figure.subplots()
     for (text, low, high), colour in zip(curve.bands, _BAND_COLOURS, strict=False):
         axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=text)
+    reached = [point.x for points in lines.values() for point in points]
+    aside = 0.004 * (max(reached) - min(reached))
     for i, (name, points) in enumerate(lines.items()):
         means = [point.y.mean for point in points]
         ends = [point.y.interval or (point.y.mean, point.y.mean) for point in points]
@@ -67,7 +69,7 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
             [high - mean for mean, (_, high) in zip(means, ends, strict=True)],
         ]
         # Side by side, so that intervals at one place do not hide each other.
-        across = [point.x * 1.04**i if curve.log else point.x + 0.06 * i for point in points]
+        across = [point.x * 1.04**i if curve.log else point.x + aside * i for point in points]
         axes.errorbar(across, means, reach, marker="o", markersize=4, capsize=3, linewidth=1.2, label=name)
     axes.set(xlabel=curve.x_label, ylabel=curve.y_label)
     if curve.log:

@@ -215,8 +215,8 @@ class Ladder:
     rungs : tuple of (text, condition)
         The start, then what stands after each step; a rung's text names the step.
     worth : tuple of (text, pairs)
-        For each step, in the same order, the condition with it and the one without it, or None: drawn beside the
-        step as the paired difference of the one without from the one with it.
+        For each step, in the same order, the condition with it and the one without it: drawn beside the step as the
+        mean of the pages' differences, the one without less the one with it.
     paper : float or None
         The paper's figure, drawn as a line.
     """

@@ -150,7 +150,8 @@ class Changes:
     title, note : str
         Heading and the sentences under it.
     pairs : tuple of (condition, against)
-        From top to bottom; a condition that ends with "/" or "=" stands for all that go on there.
+        From top to bottom; a condition that ends with "/" or "=" stands for all that go on there, and where `against`
+        ends so too, each is compared with the one that goes on alike.
     metrics : tuple of str
         Those of which less is better; of the first one the ratio is shown too, and on how many pages it is better.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ Page = tuple[int, int]
 """Trial and seed."""
 
 _NO_METHOD = "-"
+_NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +41,7 @@ class PlacePages:
 
 
 def pages_by_place(rows: Sequence[Row]) -> dict[Place, PlacePages]:
-    """Return the pages of each condition and method, sorted.
+    """Return the pages of each condition and method, sorted by name and, within a name, by number: 2 before 10.
 
     A trial that fails as a whole is recorded once, under the condition that it was planned for and the method "-". It
     is missing from all that the trial would have measured, and so counts as failed wherever the condition's name
@@ -55,11 +57,17 @@ def pages_by_place(rows: Sequence[Row]) -> dict[Place, PlacePages]:
             values[place][row.metric][page] = row.value
     whole = [(_parts(condition), pages) for (condition, method), pages in failed.items() if method == _NO_METHOD]
     found = {}
-    for place in sorted({*values, *failed}):
+    for place in sorted({*values, *failed}, key=_in_order):
         there = {page for pages in values[place].values() for page in pages}
         lost = {page for parts, pages in whole if parts <= _parts(place[0]) for page in pages} - there
         found[place] = PlacePages(dict(values[place]), frozenset(failed[place] | lost))
     return found
+
+
+def _in_order(place: Place) -> tuple[list[str | float], str]:
+    """Return a key to sort by: of the condition's pieces every second one is a number."""
+    pieces = _NUMBER.split(place[0])
+    return [float(piece) if i % 2 else piece for i, piece in enumerate(pieces)], place[1]
 
 
 def _parts(condition: str) -> frozenset[str]:

@@ -103,7 +103,7 @@ def _section(layout: Layout, section: Section, places: Mapping[Place, PlacePages
         return section.absent
     measured = {metric for pages in shown.values() for metric in pages.values}
     columns = [column for column in layout.columns if column.metric in measured.intersection(section.metrics)]
-    return _headlines(columns, dict(sorted(shown.items(), key=lambda item: (ranks[item[0]], *item[0]))))
+    return _headlines(columns, dict(sorted(shown.items(), key=lambda item: ranks[item[0]] or 0)))
 
 
 def _headlines(columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> str:
@@ -140,14 +140,17 @@ def _headline(column: Column, values: Sequence[float], n_failed: int) -> str:
 
 def _comparisons(layout: Layout, places: Mapping[Place, PlacePages]) -> list[str]:
     """Return the sections that compare by page."""
-    parts = []
+    found = []
     if layout.versus is not None:
-        text = method_against_method(layout.versus, layout.columns, places)
-        title = f"## Method against method: `{layout.versus.baseline}`"
-        parts += [] if text is None else [title, f"{layout.versus.note} {HOW_TO_READ}".strip(), text]
+        title = f"Method against method: `{layout.versus.baseline}`"
+        found.append((title, layout.versus.note, method_against_method(layout.versus, layout.columns, places)))
     for changes in layout.changes:
-        text = condition_against_condition(changes, layout.columns, places)
-        parts += [] if text is None else [f"## {changes.title}", f"{changes.note} {HOW_TO_READ}".strip(), text]
+        found.append((changes.title, changes.note, condition_against_condition(changes, layout.columns, places)))
+    parts: list[str] = []
+    for title, note, text in found:
+        if text is not None:
+            # Said once, above the first of them.
+            parts += [f"## {title}", note if parts else f"{note} {HOW_TO_READ}".strip(), text]
     return parts
 
 

@@ -104,5 +104,6 @@ def changed_places(pairs: Sequence[tuple[str, str]], places: Mapping[Place, Plac
     """Yield each place that is compared with the same method's under another condition, and that condition."""
     for wanted, against in pairs:
         for condition, method in places:
-            if named_by(wanted, condition) and condition != against and (against, method) in places:
-                yield (condition, method), against
+            same = against + condition.removeprefix(wanted) if against.endswith(("/", "=")) else against
+            if named_by(wanted, condition) and condition != same and (same, method) in places:
+                yield (condition, method), same
