@@ -315,7 +315,7 @@ class SensitivitySettings(Checked):
     mesh: list[int] = several([12, 23, 90, 180], 4, 400)
     projector_yaw_deg: list[float] = several([0.02, 0.05, 0.1], -1.0, 1.0, "degrees")
     baseline_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")
-    focal_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")
+    focal_percent: list[float] = several([0.1, 0.25, 0.5], -5.0, 5.0, "%")
 
 
 @dataclass
