@@ -73,7 +73,7 @@ LAYOUT = Layout(
         Section(
             "Mesh and rest lengths",
             "Vertices a side, and each method with the other's rest lengths: chords, or sections along the surface. "
-            "Where noise would lengthen sections the chords stay (docs/adr/0016), which on unfiltered depth is the rule.",
+            "Where noise would lengthen sections the chords stay (docs/adr/0016): on unfiltered depth as a rule.",
             ("restored", _MESH, *_with_more(_RESTS)),
             _ERRORS,
         ),
