@@ -51,7 +51,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("rig.ambient=-0.1", ("`rig.ambient`", "[0, 1]", "-0.1")),
         ("scan.ink=some", ("`scan.ink`", "true, false or null", "got some")),
         ("mesh.rows=1", ("`mesh.rows`", "[2, 1000]", "1")),
-        ("colour=red", ("`colour`", "one of ablations, budget, decoders, engine, experiment")),
+        ("colour=red", ("`colour`", "one of ablations, budget, calibrations, decoders, engine, experiment")),
         ("+x=1", ("`x`", "existing key", "+x=1")),
         ("++seed=3", ("`seed`", "++seed=3")),
         ("~seed", ("`seed`", "~seed")),
