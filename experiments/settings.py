@@ -311,7 +311,7 @@ class SensitivitySettings(Checked):
 
     group: ClassVar[str] = "sensitivity."
     slope_p90_deg: list[float] = several([10.0, 15.0, 25.0, 30.0], 1.0, 45.0, "degrees")
-    noise_scale: list[float] = several([0.5, 2.0, 4.0], 0.0, 10.0, "times the rig's own noise")
+    noise_scale: list[float] = several([0.5, 2.0, 3.0, 4.0], 0.0, 10.0, "times the rig's own noise")
     mesh: list[int] = several([12, 23, 90, 180], 4, 400)
     projector_yaw_deg: list[float] = several([0.02, 0.05, 0.1], -1.0, 1.0, "degrees")
     baseline_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")
