@@ -295,6 +295,29 @@ class IntegratorsSettings(Checked):
     )
 
 
+def several(default: list[Any], low: float, high: float, unit: str = "") -> Any:
+    """Declare a list of different numbers in [low, high]; an empty one is allowed."""
+    text = f"be a list of different numbers in [{low:g}, {high:g}]{unit and ' ' + unit}"
+    return setting(default, text, lambda values: not values or _numbers(values, low, high))
+
+
+@dataclass
+class SensitivitySettings(Checked):
+    """What the experiment `sensitivity` changes, one at a time; an empty list leaves a key alone.
+
+    `slope_p90_deg`: of drawn sheets. `noise_scale`: of the rig, which is calibrated anew. `mesh`: vertices a side.
+    `projector_yaw_deg`, `baseline_percent`, `focal_percent`: error of the calibration that the pages are scanned with.
+    """
+
+    group: ClassVar[str] = "sensitivity."
+    slope_p90_deg: list[float] = several([10.0, 15.0, 25.0, 30.0], 1.0, 45.0, "degrees")
+    noise_scale: list[float] = several([0.5, 2.0, 3.0, 4.0], 0.0, 10.0, "times the rig's own noise")
+    mesh: list[int] = several([12, 23, 90, 180], 4, 400)
+    projector_yaw_deg: list[float] = several([0.02, 0.05, 0.1], -1.0, 1.0, "degrees")
+    baseline_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")
+    focal_percent: list[float] = several([0.1, 0.25, 0.5], -5.0, 5.0, "%")
+
+
 @dataclass
 class SettlingSettings(Checked):
     """The paper's particle system on crumpled pages, one of its constants changed at a time.
@@ -410,6 +433,7 @@ class Config(Checked):
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ocr: ReadingSettings = field(default_factory=ReadingSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
+    sensitivity: SensitivitySettings = field(default_factory=SensitivitySettings)
     surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
     stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.reporting.layout import Diagram, Panel, Shares
+from experiments.reporting.figure_layout import Diagram, Panel, Shares
 from experiments.trials.schema import Row
 
 Values = Mapping[tuple[str, str, str], Sequence[float]]

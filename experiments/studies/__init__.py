@@ -12,6 +12,8 @@ STUDIES = {
     "ablations": "experiments.studies.ablations:Ablations",
     "corner_distance": "experiments.studies.corner_distance:CornerDistance",
     "ocr_misses": "experiments.studies.ocr_misses:OcrMisses",
+    "attribution": "experiments.studies.attribution:Attribution",
+    "sensitivity": "experiments.studies.sensitivity:Sensitivity",
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
     "stiffness": "experiments.studies.stiffness:Stiffness",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from experiments.reporting import Column, Curve, FigurePage, Layout, Numbers, Section
+from experiments.reporting import Column, Curve, FigurePage, Layout, Numbers, Section, Versus
 
 _LETTERS = 176
 _PAPER = {"control": "0", "unrestored": "9..18", "restored": "1..3"}
@@ -130,6 +130,12 @@ LAYOUT = Layout(
             ("words", "word_recall", "word_precision"),
             absent="Absent: `ocr.real_path` names no folder of photographs.",
         ),
+    ),
+    versus=Versus(
+        "Each method against the paper's by explicit Euler, its scan included, at every severity.",
+        "paper_euler",
+        ("restored", "restored/"),
+        ("misses", "misses_normalised", "misses_unshaded", "dense_mean_mm"),
     ),
     pages=(
         FigurePage(

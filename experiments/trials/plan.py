@@ -21,6 +21,7 @@ _SECTIONS = {
     "stiffness": "stiffness",
     "surfaces": "surfaces",
     "ocr": "ocr_misses",
+    "sensitivity": "sensitivity",
     "integrators": "integrators",
     "settling": "settling",
     "culling": "culling",
@@ -67,6 +68,8 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
         ("surfaces", "kinds"),
         ("ocr", "real_path"),
         ("ocr", "severities"),
+        ("sensitivity", "slope_p90_deg"),
+        ("sensitivity", "noise_scale"),
     ):
         settings.get(group, {}).pop(key, None)
     return settings
