@@ -9,6 +9,7 @@ import pickle
 import runpy
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
@@ -18,6 +19,7 @@ import pytest
 
 from experiments.complaints import refuse_arguments
 from experiments.program import main
+from experiments.reporting import export
 from experiments.studies import STUDIES
 from tests.experiments.conftest import Program
 from tests.experiments.fake_study import ABSENT, ALL_FAIL, NAN, STEP_FAILS, TRIAL_1_FAILS, FakeStudy
@@ -240,8 +242,18 @@ def test_a_run_leaves_its_contracted_files_and_no_others(program: Program, out: 
     found = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
     pages = {f"figures/page_{trial}.png" for trial in range(4)}
     files = {"results.sqlite", "results.csv", "timings.csv", "table.md", "run.json", "figures/corners.png"}
-    assert found == files | pages
+    assert found == files | pages | ({"results.parquet"} if find_spec("pyarrow") else set())
     assert {path.name for path in out.parent.iterdir()} == {"log", "out"}
+
+
+def test_without_pyarrow_no_parquet_of_other_rows_is_left(
+    program: Program, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out.mkdir()
+    (out / "results.parquet").write_bytes(b"of an earlier run")
+    monkeypatch.setattr(export, "find_spec", lambda name: None)
+    assert program("trials=1") == 0
+    assert not (out / "results.parquet").exists()
 
 
 def test_results_are_tidy_sorted_and_hold_no_times(program: Program, out: Path) -> None:

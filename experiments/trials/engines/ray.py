@@ -10,9 +10,10 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import partial
+from io import StringIO
 from typing import Any
 
 import ray
@@ -54,25 +55,30 @@ class Ray:
         InputError
             If no cluster can be had.
         """
-        try:
-            self._connect()
-            # Bytes, so that a worker's arrays are its own and writable, as in any other engine.
-            work = ray.put(pickle.dumps((run, prepare())))
-            task = ray.remote(_carry_out).options(num_cpus=1, max_retries=WORKERS_A_TRIAL - 1)
-            waiting, running = list(reversed(keys)), dict[Any, TrialKey]()
-            while waiting or running:
-                while waiting and len(running) < (self.workers or _MOST_AT_ONCE):
-                    key = waiting.pop()
-                    running[task.remote(work, key)] = key
-                done, _ = ray.wait(list(running))
-                for reference in done:
-                    key = running.pop(reference)
-                    yield key, _outcome(reference, key)
-        finally:
-            ray.shutdown()
+        # Ray prints pages about every dead worker, and has no switch for it; what matters is in the outcomes.
+        with redirect_stdout(StringIO()):
+            try:
+                self._connect()
+                # Bytes, so that a worker's arrays are its own and writable, as in any other engine.
+                work = ray.put(pickle.dumps((run, prepare())))
+                yield from self._outcomes(keys, work)
+            finally:
+                ray.shutdown()
+
+    def _outcomes(self, keys: Sequence[TrialKey], work: Any) -> Finished:
+        task = ray.remote(_carry_out).options(num_cpus=1, max_retries=WORKERS_A_TRIAL - 1)
+        waiting, running = list(reversed(keys)), dict[Any, TrialKey]()
+        while waiting or running:
+            while waiting and len(running) < (self.workers or _MOST_AT_ONCE):
+                key = waiting.pop()
+                running[task.remote(work, key)] = key
+            done, _ = ray.wait(list(running))
+            for reference in done:
+                key = running.pop(reference)
+                yield key, _outcome(reference, key)
 
     def _connect(self) -> None:
-        # Ray tells of its token, its sockets and every dead worker; what matters is in the outcomes.
+        # Whether its token is used, and the like.
         logging.getLogger("ray").setLevel(logging.ERROR)
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         options: dict[str, Any] = {"configure_logging": False, "log_to_driver": False}

@@ -12,8 +12,10 @@ import subprocess
 import time
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from contextlib import redirect_stderr
 from dataclasses import dataclass
 from functools import partial
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +137,8 @@ class Slurm:
             executor.update_parameters(slurm_partition=self.partition)
         path = os.pathsep.join(filter(None, (str(_ROOT), os.environ.get("PYTHONPATH"))))
         try:
-            with environment({**ONE_THREAD, "PYTHONPATH": path}):
+            # What sbatch has to say is in the error, too.
+            with environment({**ONE_THREAD, "PYTHONPATH": path}), redirect_stderr(StringIO()):
                 handles = executor.map_array(partial(_carry_out_all, self.folder), batches) if batches else []
         except (FailedJobError, OSError) as error:
             raise StepError(f"SLURM refused the jobs: {in_one_line(error)}; finished trials are kept.") from error
