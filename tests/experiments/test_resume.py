@@ -15,7 +15,7 @@ import pytest
 
 from experiments.settings import Config
 from experiments.trials import TrialKey
-from experiments.trials.engines import _answer, _Worker
+from experiments.trials.engines.processes import _answer, _Worker
 from tests.experiments.conftest import Program
 from tests.experiments.fake_study import KILLED_ONCE, TRIAL_1_KILLS, FakeStudy
 
@@ -102,10 +102,11 @@ def test_killed_worker_costs_one_trial_which_the_next_run_tries_again(program: P
 
 def test_ctrl_c_reaches_no_worker_even_while_it_imports() -> None:
     config = Config(experiment="fake", trials=1, method="a")
-    worker = _Worker.start(partial(FakeStudy().run, config, 0.25))
+    worker = _Worker.start(partial(FakeStudy().run, config))
     try:
         # It takes a second to import: this comes first.
         os.kill(worker.process.pid or 0, signal.SIGINT)
+        worker.share(0.25)
         worker.take(TrialKey("fake"))
         _, outcome = _answer(worker)
     finally:
