@@ -75,11 +75,6 @@ def rigid_mean(places: Floats, others: Floats) -> float:
     return float(np.linalg.norm(metrics.fit_rigid(a, b).apply(a) - b, axis=1).mean())
 
 
-def mapped_slope(trial: int, n_trials: int) -> float:
-    """Severity of a sheet in the map of outcomes: evenly from gentle to steep [deg]."""
-    return _SHORTEST + (_STEEPEST - _SHORTEST) * (trial + 0.5) / n_trials
-
-
 def spread_slope(trial: int) -> float:
     """Severity of a sheet of a trial [deg], spread from gentle to steep however many trials there are.
 
