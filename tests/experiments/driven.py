@@ -20,7 +20,7 @@ N_TRIALS = 200
 COMMAND = (sys.executable, "-m", "tests.experiments.fake_program", f"trials={N_TRIALS}", f"sheet.slope_p90_deg={SLOW}")
 
 
-def until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
+def until(holds: Callable[[], bool], seconds: float = 180.0) -> None:
     """Wait until something holds, and fail if it does not in this time."""
     deadline = time.monotonic() + seconds
     while not holds():
@@ -87,12 +87,12 @@ class Run:
     def interrupt(self) -> tuple[int, str]:
         """Press ctrl-C, which a terminal sends to all processes; return the exit code and the last line on stderr."""
         os.killpg(self.process.pid, signal.SIGINT)
-        _, error = self.process.communicate(timeout=60)
+        _, error = self.process.communicate(timeout=180)
         return self.process.returncode, error.splitlines()[-1]
 
     def end(self) -> None:
         """See it end well."""
-        printed, error = self.process.communicate(timeout=120)
+        printed, error = self.process.communicate(timeout=300)
         assert self.process.returncode == 0, error
         assert printed.startswith(f"fake: {N_TRIALS} trials, "), printed
         assert "failed" not in printed, printed

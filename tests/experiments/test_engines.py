@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import http.server
 import socket
 import sys
-import threading
-from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -49,36 +46,28 @@ def test_a_missing_extra_is_one_line_that_names_it(
     assert not out.exists()
 
 
-@pytest.fixture
-def page() -> Iterator[str]:
-    """The address of something that is no Ray cluster."""
-    with http.server.HTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        yield f"127.0.0.1:{server.server_port}"
-        server.shutdown()
-        thread.join()
-
-
 @pytest.mark.skipif(find_spec("ray") is None, reason="ray is not installed")
+@pytest.mark.parametrize("listens", [False, True])
 def test_an_address_without_a_cluster_is_refused_before_anything_is_done(
     program: Program,
     out: Path,
     log: Path,
-    page: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
+    listens: bool,
 ) -> None:
     from experiments.trials.engines import ray
 
     monkeypatch.setattr(ray, "_ANSWER_SECONDS", 3.0)
-    with socket.socket() as nobody:
-        nobody.bind(("127.0.0.1", 0))
-        for address in (f"127.0.0.1:{nobody.getsockname()[1]}", page):
-            assert program("engine=ray", f"engine.address={address}") == 2
-            (line,) = capsys.readouterr().err.splitlines()
-            assert line.startswith("`engine.address` must be HOST:PORT of a Ray cluster that runs, or null")
-            assert f"got {address}" in line
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        if listens:
+            other.listen()
+        address = f"127.0.0.1:{other.getsockname()[1]}"
+        assert program("engine=ray", f"engine.address={address}") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("`engine.address` must be HOST:PORT of a Ray cluster that runs, or null to start one here")
+    assert f"got {address}" in line
     assert not out.exists()
     assert log.read_text() == ""
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sqlite3
-import subprocess
-import sys
-import time
 from functools import partial
 from pathlib import Path
 
@@ -18,8 +15,6 @@ from experiments.trials import TrialKey
 from experiments.trials.engines.processes import _answer, _Worker
 from tests.experiments.conftest import Program
 from tests.experiments.fake_study import KILLED_ONCE, TRIAL_1_KILLS, FakeStudy
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def lines_of(log: Path) -> list[str]:
@@ -125,48 +120,6 @@ def test_worker_killed_from_outside_loses_no_row(program: Program, out: Path, lo
     (out / "results.sqlite").unlink()
     assert program(trouble) == 0
     assert (out / "results.csv").read_bytes() == survived
-
-
-DRIVER = """
-import sys, time
-from tests.experiments import conftest, fake_study
-from experiments.program import main
-from experiments.trials import plan
-if __name__ == "__main__":
-    conftest.register_fake()
-    plan.SOURCES = conftest.SOURCES
-    slow = fake_study.FakeStudy.run
-    def run(self, config, shared, key):
-        if key.trial == 2:
-            time.sleep(60)
-        return slow(self, config, shared, key)
-    fake_study.FakeStudy.run = run
-    sys.exit(main(sys.argv[1:]))
-"""
-
-
-def test_killed_driver_keeps_its_finished_trials(program: Program, out: Path, log: Path) -> None:
-    command = [sys.executable, "-c", DRIVER, "experiment=fake", f"out={out}", "engine=serial"]
-    driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
-    try:
-        deadline = time.monotonic() + 60.0
-        while "trial 1" not in lines_of(log):
-            assert driver.poll() is None
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
-        # The driver notes a trial in the log just before it stores it.
-        time.sleep(0.3)
-    finally:
-        os.killpg(driver.pid, signal.SIGKILL)
-        driver.wait()
-    assert not (out / "results.csv").exists()
-    log.write_text("")
-    assert program() == 0
-    assert lines_of(log) == ["prepare", "trial 2", "trial 3"]
-    resumed = (out / "results.csv").read_bytes()
-    (out / "results.sqlite").unlink()
-    assert program() == 0
-    assert (out / "results.csv").read_bytes() == resumed
 
 
 def test_two_runs_cannot_share_a_folder(program: Program, out: Path, capsys: pytest.CaptureFixture[str]) -> None:
