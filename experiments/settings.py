@@ -318,6 +318,74 @@ class IntegratorsSettings(Checked):
     )
 
 
+def several(default: list[Any], low: float, high: float, unit: str = "") -> Any:
+    """Declare a list of different numbers in [low, high]; an empty one is allowed."""
+    text = f"be a list of different numbers in [{low:g}, {high:g}]{unit and ' ' + unit}"
+    return setting(default, text, lambda values: not values or _numbers(values, low, high))
+
+
+@dataclass
+class SensitivitySettings(Checked):
+    """What the experiment `sensitivity` changes, one at a time; an empty list leaves a key alone.
+
+    `slope_p90_deg`: of drawn sheets. `noise_scale`: of the rig, which is calibrated anew. `mesh`: vertices a side.
+    `projector_yaw_deg`, `baseline_percent`, `focal_percent`: error of the calibration that the pages are scanned with.
+    """
+
+    group: ClassVar[str] = "sensitivity."
+    slope_p90_deg: list[float] = several([10.0, 15.0, 25.0, 30.0], 1.0, 45.0, "degrees")
+    noise_scale: list[float] = several([0.5, 2.0, 3.0, 4.0], 0.0, 10.0, "times the rig's own noise")
+    mesh: list[int] = several([12, 23, 90, 180], 4, 400)
+    projector_yaw_deg: list[float] = several([0.02, 0.05, 0.1], -1.0, 1.0, "degrees")
+    baseline_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")
+    focal_percent: list[float] = several([0.1, 0.25, 0.5], -5.0, 5.0, "%")
+
+
+@dataclass
+class SettlingSettings(Checked):
+    """The paper's particle system on crumpled pages, one of its constants changed at a time.
+
+    `restitutions`: coefficients k_r. `stiffer`: what k_s is multiplied by.
+    `pushes`: weight of a vertex over k_s times a spring's length.
+    `max_steps`: after which a page counts as unfinished; the usual one needs a tenth of them.
+    """
+
+    group: ClassVar[str] = "settling."
+    restitutions: list[float] = setting(
+        [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0],
+        "be a list of different numbers in [0, 1]",
+        lambda values: _numbers(values, 0.0, 1.0),
+    )
+    stiffer: list[float] = setting(
+        [2.0, 20.0, 200.0], "be a list of different numbers in [1, 10000]", lambda values: _numbers(values, 1.0, 1e4)
+    )
+    pushes: list[float] = setting(
+        [0.002, 0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5.0],
+        "be a list of different numbers in [0.00001, 100]",
+        lambda values: _numbers(values, 1e-5, 100.0),
+    )
+    max_steps: int = count(10_000, 200, 1_000_000)
+
+
+@dataclass
+class CullingSettings(Checked):
+    """Epipolar culling of pages at several noise levels, through one calibration made at `rig.noise_scale`.
+
+    `noise_scales`: values of `rig.noise_scale` for the pages.
+    `tolerances_px`: distances from the epipolar line at which points are culled.
+    `outlier_mm`: depth error from which a point is an outlier; 3 mm are some three projector lines.
+    """
+
+    group: ClassVar[str] = "culling."
+    noise_scales: list[float] = values_of("noise_scale", [1.0, 2.0, 4.0])
+    tolerances_px: list[float] = setting(
+        [1.0, 2.0, 4.0],
+        "be a list of different numbers in [0.1, 100] projector px",
+        lambda values: _numbers(values, 0.1, 100.0),
+    )
+    outlier_mm: float = number(3.0, 0.1, 100.0, "mm")
+
+
 @dataclass
 class DecodersSettings(Checked):
     """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
@@ -368,6 +436,12 @@ class Config(Checked):
     out: str | None = setting(
         None, "be the name of a folder, without line breaks", lambda value: value is None or value.isprintable()
     )
+    # Experiments on one rig need not calibrate it again and again.
+    calibrations: str | None = setting(
+        None,
+        "be the name of a folder for calibrations that other runs may use, or null",
+        lambda value: value is None or (value.isprintable() and value != ""),
+    )
     budget: BudgetSettings = field(default_factory=BudgetSettings)
     engine: EngineSettings = field(default_factory=EngineSettings)
     sheet: SheetSettings = field(default_factory=SheetSettings)
@@ -376,10 +450,13 @@ class Config(Checked):
     scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
     integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
+    settling: SettlingSettings = field(default_factory=SettlingSettings)
+    culling: CullingSettings = field(default_factory=CullingSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ocr: ReadingSettings = field(default_factory=ReadingSettings)
     ablations: AblationSettings = field(default_factory=AblationSettings)
+    sensitivity: SensitivitySettings = field(default_factory=SensitivitySettings)
     surfaces: SurfacesSettings = field(default_factory=SurfacesSettings)
     stiffness: StiffnessSettings = field(default_factory=StiffnessSettings)
 

@@ -1,5 +1,6 @@
 """Flattening: the paper's mass-spring particle system (section 3), and the same springs solved for rest at once."""
 
+from deskew.flattening.inside import flat_surface
 from deskew.flattening.materials import middles, with_stiffness
 from deskew.flattening.methods import DEFAULT, METHODS, Flattener, find_integrator, find_method, flatten
 from deskew.flattening.schemes import INTEGRATORS
@@ -14,6 +15,7 @@ __all__ = [
     "StaticSettings",
     "find_integrator",
     "find_method",
+    "flat_surface",
     "flatten",
     "middles",
     "with_stiffness",

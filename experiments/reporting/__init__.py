@@ -4,26 +4,26 @@ Only the layout is offered here, because each worker imports it with its study; 
 the driver from its own module.
 """
 
-from experiments.reporting.layout import (
-    Column,
+from experiments.reporting.figure_layout import (
     Curve,
     Diagram,
     FigurePage,
-    Layout,
+    Ladder,
     Montage,
     Numbers,
     Panel,
     Plot,
-    Section,
     Shares,
-    Times,
 )
+from experiments.reporting.layout import Changes, Column, Layout, Section, Tails, Times, Versus
 
 __all__ = [
+    "Changes",
     "Column",
     "Curve",
     "Diagram",
     "FigurePage",
+    "Ladder",
     "Layout",
     "Montage",
     "Numbers",
@@ -31,5 +31,7 @@ __all__ = [
     "Plot",
     "Section",
     "Shares",
+    "Tails",
     "Times",
+    "Versus",
 ]

@@ -6,10 +6,12 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean
+from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-from experiments.reporting.layout import Curve
+from experiments.reporting.figure_layout import Curve
 from experiments.reporting.statistics import Summary, summarise
 from experiments.trials.schema import Row
 
@@ -50,6 +52,15 @@ def curve_points(curve: Curve, rows: Sequence[Row]) -> dict[str, list[Point]]:
     return {name: sorted(points, key=lambda point: point.x) for name, points in lines.items()}
 
 
+def label_by_numbers(axis: Any) -> None:
+    """Label a logarithmic axis of three decades at most by plain numbers, with a 2 and a 5 between powers of ten."""
+    low, high = axis.get_view_interval()
+    if high <= 1000 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FormatStrFormatter("%g"))
+        axis.set_minor_formatter(NullFormatter())
+
+
 def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
     """Draw the means with their intervals; None without data."""
     lines = curve_points(curve, rows)
@@ -59,6 +70,8 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
     axes = figure.subplots()
     for (text, low, high), colour in zip(curve.bands, _BAND_COLOURS, strict=False):
         axes.axhspan(low, high, color=colour, alpha=0.12, linewidth=0, label=text)
+    reached = [point.x for points in lines.values() for point in points]
+    aside = 0.004 * (max(reached) - min(reached))
     for i, (name, points) in enumerate(lines.items()):
         means = [point.y.mean for point in points]
         ends = [point.y.interval or (point.y.mean, point.y.mean) for point in points]
@@ -67,11 +80,13 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
             [high - mean for mean, (_, high) in zip(means, ends, strict=True)],
         ]
         # Side by side, so that intervals at one place do not hide each other.
-        across = [point.x * 1.04**i if curve.log else point.x + 0.06 * i for point in points]
+        across = [point.x * 1.04**i if curve.log else point.x + aside * i for point in points]
         axes.errorbar(across, means, reach, marker="o", markersize=4, capsize=3, linewidth=1.2, label=name)
     axes.set(xlabel=curve.x_label, ylabel=curve.y_label)
     if curve.log:
         axes.set(xscale="log", yscale="log")
+        label_by_numbers(axes.xaxis)
+        label_by_numbers(axes.yaxis)
     else:
         axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)

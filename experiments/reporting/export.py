@@ -18,6 +18,7 @@ from experiments.reporting.curves import curve_plot
 from experiments.reporting.diagrams import diagram_plot, shares_plot
 from experiments.reporting.figure_pages import figure_page, pictures_on
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
+from experiments.reporting.ladders import ladder_plot
 from experiments.reporting.layout import Layout
 from experiments.reporting.tables import table, times_page
 from experiments.trials.schema import Failure, Row
@@ -66,6 +67,7 @@ def _figures(layout: Layout, results: Results) -> dict[str, bytes]:
         *((curve.name, curve_plot(curve, rows)) for curve in layout.curves),
         *((diagram.name, diagram_plot(diagram, timed)) for diagram in layout.diagrams),
         *((shares.name, shares_plot(shares, rows)) for shares in layout.shares),
+        *((ladder.name, ladder_plot(ladder, rows)) for ladder in layout.ladders),
         *((montage.name, picture_wall(montage, pictures)) for montage in layout.montages),
     ]
     pages = [(page.name, figure_page(page, layout.columns, rows, pictures)) for page in layout.pages]
@@ -80,7 +82,15 @@ def _figures(layout: Layout, results: Results) -> dict[str, bytes]:
 
 def require_targets(out: Path, layout: Layout) -> None:
     """Raise an InputError where a report could not be written under `out`: to be asked before the trials."""
-    figures = (layout.plots, layout.curves, layout.diagrams, layout.shares, layout.montages, layout.pages)
+    figures = (
+        layout.plots,
+        layout.curves,
+        layout.diagrams,
+        layout.shares,
+        layout.ladders,
+        layout.montages,
+        layout.pages,
+    )
     drawn = [item.name for kind in figures for item in kind]
     names = [
         "results.csv",

@@ -15,7 +15,8 @@ import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from experiments.reporting.layout import Column, FigurePage
+from experiments.reporting.figure_layout import FigurePage
+from experiments.reporting.layout import Column
 from experiments.reporting.page_numbers import FONT_PT, GAP_MM, NumbersTable, numbers_table, text_width_mm
 from experiments.trials.schema import Row
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from experiments.reporting.layout import Montage, Plot
+from experiments.reporting.figure_layout import Montage, Plot
 from experiments.trials.schema import Row
 
 

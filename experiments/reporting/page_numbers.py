@@ -8,7 +8,8 @@ from statistics import fmean
 
 from matplotlib.textpath import TextPath
 
-from experiments.reporting.layout import Column, FigurePage
+from experiments.reporting.figure_layout import FigurePage
+from experiments.reporting.layout import Column
 from experiments.trials.record import FAILED
 from experiments.trials.schema import Row
 

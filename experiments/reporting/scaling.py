@@ -26,7 +26,7 @@ _PAGES_A_DAY = (100, 10_000)
 _SECONDS_A_DAY = 86_400
 # What a machine-vision camera of 640 x 480 pixels gives at the least.
 _FRAMES_A_SECOND = 30.0
-_EXPERIMENTS = ("plane_accuracy", "corner_distance", "corner_distance_physical", "ocr_misses", "stiffness", "textures")
+_EXPERIMENTS = ("plane_accuracy", "corner_distance", "ocr_misses", "stiffness", "textures")
 
 Cells = Sequence[str]
 

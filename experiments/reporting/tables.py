@@ -1,27 +1,31 @@
-"""Rows to `table.md`: a summary, each trial in the paper's manner, then all of them with their spread."""
+"""Rows to `table.md`: a summary, tails, comparisons by page, each trial in the paper's manner, all and their spread."""
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from statistics import median
 
 from experiments.reporting.layout import Column, Layout, Section, Times
+from experiments.reporting.markdown import NONE, markdown_table, share, with_interval
+from experiments.reporting.pages import Place, PlacePages, pages_by_place
 from experiments.reporting.statistics import share_interval, summarise
+from experiments.reporting.tails import tails_table
+from experiments.reporting.versus import HOW_TO_READ, condition_against_condition, method_against_method
 from experiments.trials.schema import Failure, Row
 
 # Beyond this many a line a trial is no longer read; `results.csv` has them all.
 _MAX_TRIALS_SHOWN = 10
-_NONE = "–"
-
-Place = tuple[str, str]
-
-
-def markdown_table(headings: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """Return a Markdown table; the first column is text, the others are set flush right."""
-    rule = ["---"] + ["---:"] * (len(headings) - 1)
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in (headings, rule, *lines))
+_HOW_TO_READ = (
+    "Mean over the trials (of root mean squares the pooled one) with its 95 % bootstrap interval; shares with "
+    "Wilson's, a failed trial counting against them."
+)
+_FEW = 12
+_OF_FEW = (
+    f" Under {_FEW} trials the intervals of means hold the truth less often than they say: with 5 in some 88 cases of "
+    "100 (docs/adr/0025)."
+)
 
 
 def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timings: Sequence[Row] = ()) -> str:
@@ -38,23 +42,18 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timi
     timings : sequence of Row
         Shown where the layout asks for times.
     """
+    places = pages_by_place(rows)
     parts = [f"# {layout.title}", layout.note]
     for times in layout.times:
         parts += [f"## {times.title}", times.note, _times(times, timings)]
-    headlines = [column for column in layout.columns if column.headline]
-    if headlines or layout.sections:
-        parts += [
-            "## Summary",
-            "Mean over the trials (of root mean squares the pooled one) with its 95 % bootstrap interval; shares with "
-            "Wilson's, a failed trial counting against them.",
-        ]
-    if headlines:
-        parts.append(_headlines(headlines, _by_place(rows)))
-    for section in layout.sections:
-        parts += [f"**{section.title}.** {section.note}", _section(layout, section, rows)]
+    parts += _summary(layout, places)
+    for tails in layout.tails:
+        spread = tails_table(tails, layout.columns, places)
+        parts += [] if spread is None else [f"## {tails.title}", tails.note, spread]
+    parts += _comparisons(layout, places)
     if not layout.sections and len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
         parts += ["## Each trial", _each_trial(layout, rows)]
-    parts += ["## All trials", _all_trials(layout, rows)]
+    parts += ["## All trials", _all_trials(layout, places)]
     if failures:
         lines = [[str(f.trial), str(f.seed), f.condition, f.method, f.reason.replace("|", "/")] for f in failures]
         parts += ["## Failed", markdown_table(("trial", "seed", "condition", "method", "reason"), lines)]
@@ -68,24 +67,91 @@ def times_page(times: Times, timings: Sequence[Row]) -> str:
 
 def _times(times: Times, timings: Sequence[Row]) -> str:
     """Return a line a condition and method; of several trials the median."""
+    metrics = [column.metric for column in times.columns]
     found = [
-        (place, [median(metrics[column.metric]) if column.metric in metrics else None for column in times.columns])
-        for place, metrics in _by_place(timings).items()
+        (place, [median(pages.of(metric)) if metric in pages.values else None for metric in metrics])
+        for place, pages in pages_by_place(timings).items()
     ]
     ranks = {condition: rank for rank, condition in enumerate(times.order)}
     found.sort(key=lambda item: (ranks.get(item[0][0], len(ranks)), item[0][0], -(item[1][0] or 0.0), item[0][1]))
     lines = [
-        [
-            *place,
-            *(
-                _NONE if value is None else f"{value:.{c.digits}f}"
-                for value, c in zip(values, times.columns, strict=True)
-            ),
-        ]
+        [*place, *(with_interval(value, None, c.digits) for value, c in zip(values, times.columns, strict=True))]
         for place, values in found
         if values[0] is not None
     ]
     return markdown_table(("condition", "method", *(column.heading for column in times.columns)), lines)
+
+
+def _summary(layout: Layout, places: Mapping[Place, PlacePages]) -> list[str]:
+    headlines = [column for column in layout.columns if column.headline]
+    if not headlines and not layout.sections:
+        return []
+    few = any(len(pages.of(metric)) < _FEW for pages in places.values() for metric in pages.values)
+    parts = ["## Summary", _HOW_TO_READ + (_OF_FEW if few else "")]
+    if headlines:
+        parts.append(_headlines(headlines, places))
+    for section in layout.sections:
+        parts += [f"**{section.title}.** {section.note}", _section(layout, section, places)]
+    return parts
+
+
+def _section(layout: Layout, section: Section, places: Mapping[Place, PlacePages]) -> str:
+    """Return a part of the summary: its own conditions in their order, and those of its columns that have data."""
+    ranks = {place: section.rank(place[0]) for place in places}
+    shown = {place: pages for place, pages in places.items() if ranks[place] is not None}
+    if not shown and section.absent:
+        return section.absent
+    measured = {metric for pages in shown.values() for metric in pages.values}
+    columns = [column for column in layout.columns if column.metric in measured.intersection(section.metrics)]
+    return _headlines(columns, dict(sorted(shown.items(), key=lambda item: ranks[item[0]] or 0)))
+
+
+def _headlines(columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> str:
+    """Return a line a condition and method (if there are any), a column a metric, the paper's figures below."""
+    lines = []
+    for (condition, method), pages in places.items():
+        counts = [len(pages.values[column.metric]) for column in columns if column.metric in pages.values]
+        if not counts and not pages.failed:
+            continue
+        cells = [_headline(column, pages.of(column.metric), len(pages.failed)) for column in columns]
+        lines.append([condition, method, str(max(counts, default=0)), str(len(pages.failed)), *cells])
+    paper = [next(iter(column.paper.values()), NONE) for column in columns]
+    if set(paper) != {NONE}:
+        lines.append(["the paper", NONE, NONE, NONE, *paper])
+    headings = ["condition", "method", "n", "failed", *(column.heading for column in columns)]
+    if all(method == "-" for _, method in places):
+        headings, *lines = ([line[0], *line[2:]] for line in (headings, *lines))
+    return markdown_table(headings, lines)
+
+
+def _headline(column: Column, values: Sequence[float], n_failed: int) -> str:
+    """Return mean, pooled root mean square or share of one column, with its 95 % interval."""
+    if not values:
+        return NONE
+    if column.share:
+        return share(int(sum(values)), len(values) + n_failed)
+    if not column.rms:
+        found = summarise(values)
+        return with_interval(found.mean, found.interval, column.digits)
+    found = summarise([value**2 for value in values])
+    ends = None if found.interval is None else (math.sqrt(found.interval[0]), math.sqrt(found.interval[1]))
+    return with_interval(math.sqrt(found.mean), ends, column.digits)
+
+
+def _comparisons(layout: Layout, places: Mapping[Place, PlacePages]) -> list[str]:
+    """Return the sections that compare by page."""
+    found = []
+    if layout.versus is not None:
+        title = f"Method against method: `{layout.versus.baseline}`"
+        found.append((title, layout.versus.note, method_against_method(layout.versus, layout.columns, places)))
+    for changes in layout.changes:
+        found.append((changes.title, changes.note, condition_against_condition(changes, layout.columns, places)))
+    parts: list[str] = []
+    for title, note, text in found:
+        if text is not None:
+            # Said once, above the first of them.
+            parts += [f"## {title}", note if parts else f"{note} {HOW_TO_READ}".strip(), text]
+    return parts
 
 
 def _each_trial(layout: Layout, rows: Sequence[Row]) -> str:
@@ -104,80 +170,31 @@ def _each_trial(layout: Layout, rows: Sequence[Row]) -> str:
 def _cell(found: dict[str, float], column: Column) -> str:
     if column.metric in found:
         return f"{found[column.metric]:.{column.digits}f}"
-    return "failed" if "failed" in found else _NONE
+    return "failed" if "failed" in found else NONE
 
 
-def _by_place(rows: Sequence[Row]) -> dict[Place, dict[str, list[float]]]:
-    values: dict[Place, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for row in rows:
-        values[row.condition, row.method][row.metric].append(row.value)
-    return dict(sorted(values.items()))
-
-
-def _section(layout: Layout, section: Section, rows: Sequence[Row]) -> str:
-    """Return a part of the summary: its own conditions in their order, and those of its columns that have data."""
-    ranks = {condition: section.rank(condition) for condition in {row.condition for row in rows}}
-    places = _by_place([row for row in rows if ranks[row.condition] is not None])
-    if not places and section.absent:
-        return section.absent
-    measured = {metric for metrics in places.values() for metric in metrics}
-    columns = [column for column in layout.columns if column.metric in measured.intersection(section.metrics)]
-    return _headlines(columns, dict(sorted(places.items(), key=lambda item: (ranks[item[0][0]], *item[0]))))
-
-
-def _headlines(columns: Sequence[Column], places: Mapping[Place, Mapping[str, Sequence[float]]]) -> str:
-    """Return a line a condition and method (if there are any), a column a metric, the paper's figures below."""
+def _all_trials(layout: Layout, places: Mapping[Place, PlacePages]) -> str:
     lines = []
-    for (condition, method), metrics in places.items():
-        if not any(column.metric in metrics for column in columns) and "failed" not in metrics:
-            continue
-        counts = [len(metrics[column.metric]) for column in columns if column.metric in metrics]
-        n_failed = len(metrics.get("failed", ()))
-        cells = [_headline(column, metrics.get(column.metric, ()), n_failed) for column in columns]
-        lines.append([condition, method, str(max(counts, default=0)), str(n_failed), *cells])
-    paper = [next(iter(column.paper.values()), _NONE) for column in columns]
-    if set(paper) != {_NONE}:
-        lines.append(["the paper", _NONE, _NONE, _NONE, *paper])
-    headings = ["condition", "method", "n", "failed", *(column.heading for column in columns)]
-    if all(method == "-" for _, method in places):
-        headings, *lines = ([line[0], *line[2:]] for line in (headings, *lines))
-    return markdown_table(headings, lines)
-
-
-def _headline(column: Column, values: Sequence[float], n_failed: int) -> str:
-    """Return mean, pooled root mean square or share of one column, with its 95 % interval."""
-    if not values:
-        return _NONE
-    if column.share:
-        n, n_ones = len(values) + n_failed, int(sum(values))
-        low, high = share_interval(n_ones, n)
-        return f"{n_ones} of {n} ({100 * low:.0f}..{100 * high:.0f} %)"
-    found = summarise([value**2 for value in values]) if column.rms else summarise(values)
-    middle, ends = found.mean, found.interval
-    if column.rms:
-        middle, ends = math.sqrt(middle), None if ends is None else (math.sqrt(ends[0]), math.sqrt(ends[1]))
-    interval = "" if ends is None else f" ({ends[0]:.{column.digits}f}..{ends[1]:.{column.digits}f})"
-    return f"{middle:.{column.digits}f}{interval}"
-
-
-def _all_trials(layout: Layout, rows: Sequence[Row]) -> str:
-    lines = []
-    for (condition, method), metrics in _by_place(rows).items():
-        n_failed = len(metrics.get("failed", ()))
-        named = [column for column in layout.columns if column.metric in metrics]
+    for (condition, method), pages in places.items():
+        n_failed = len(pages.failed)
+        named = [column for column in layout.columns if column.metric in pages.values]
         lines += [
-            [condition, method, *_summary(column, metrics[column.metric], n_failed, condition)] for column in named
+            [condition, method, *_spread(column, pages.of(column.metric), n_failed, condition)] for column in named
         ]
         if n_failed and not named:
-            lines.append([condition, method, _NONE, "0", str(n_failed), *[_NONE] * 6])
-    headings = ("condition", "method", "metric", "n", "failed", "mean", "95 % of mean", "median", "min", "max", "paper")
-    return markdown_table(headings, lines)
+            lines.append([condition, method, NONE, "0", str(n_failed), *[NONE] * 7])
+    headings = ["condition", "method", "metric", "n", "failed", "mean", "95 % of mean"]
+    return markdown_table([*headings, "median", "min", "9 in 10 below", "max", "paper"], lines)
 
 
-def _summary(column: Column, values: Sequence[float], n_failed: int, condition: str) -> list[str]:
-    found = summarise(values)
-    digits = column.digits
-    interval = _NONE if found.interval is None else f"{found.interval[0]:.{digits}f}..{found.interval[1]:.{digits}f}"
-    spread = (f"{value:.{digits}f}" for value in (found.median, found.minimum, found.maximum))
-    paper = column.paper_figure(condition) or _NONE
-    return [column.heading, str(found.n), str(n_failed), f"{found.mean:.{digits}f}", interval, *spread, paper]
+def _spread(column: Column, values: Sequence[float], n_failed: int, condition: str) -> list[str]:
+    found, digits = summarise(values), column.digits
+    mean, interval = found.mean, found.interval
+    if column.share:
+        # As in the summary: a failed trial counts against it.
+        n, n_ones = len(values) + n_failed, int(sum(values))
+        mean, interval = n_ones / n, share_interval(n_ones, n)
+    ends = NONE if interval is None else f"{interval[0]:.{digits}f}..{interval[1]:.{digits}f}"
+    spread = [with_interval(value, None, digits) for value in (found.median, found.minimum, found.p90, found.maximum)]
+    paper = column.paper_figure(condition) or NONE
+    return [column.heading, str(found.n), str(n_failed), f"{mean:.{digits}f}", ends, *spread, paper]

@@ -12,12 +12,16 @@ STUDIES = {
     "ablations": "experiments.studies.ablations:Ablations",
     "corner_distance": "experiments.studies.corner_distance:CornerDistance",
     "ocr_misses": "experiments.studies.ocr_misses:OcrMisses",
+    "attribution": "experiments.studies.attribution:Attribution",
+    "sensitivity": "experiments.studies.sensitivity:Sensitivity",
     "decoders": "experiments.studies.decoders:Decoders",
     "textures": "experiments.studies.textures:TexturesStudy",
     "stiffness": "experiments.studies.stiffness:Stiffness",
     "real_boards": "experiments.studies.real_boards:RealBoards",
     "surfaces": "experiments.studies.surfaces:Surfaces",
     "integrators": "experiments.studies.integrators:Integrators",
+    "settling": "experiments.studies.settling:Settling",
+    "culling": "experiments.studies.culling:Culling",
     "speed": "experiments.studies.speed:Speed",
 }
 

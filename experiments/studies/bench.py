@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -10,8 +12,11 @@ import data_synth
 from data_synth import Rig
 from deskew import pipeline
 from deskew.acquisition import SweepSettings
+from deskew.errors import InputError
+from deskew.io import read_calibration, write_calibration
 from deskew.types import Calibration, Pinhole
 from experiments.settings import Config, RigSettings
+from experiments.trials import fingerprint
 
 # Random numbers of the calibration shots: a trial's number that no trial has, nor have those below it.
 _CALIBRATION = 2**32 - 1
@@ -60,20 +65,50 @@ def configured_rig(settings: RigSettings) -> Rig:
 def calibrated_bench(config: Config, mode: str, draw: int = 0, camera: Pinhole | None = None) -> Bench:
     """Photograph the printed board in its poses and calibrate both devices from that.
 
+    Where `config.calibrations` names a folder, what an earlier run has calibrated in the same way is read from there:
+    experiments on one rig share their boards.
+
     Parameters
     ----------
     config : Config
-        Its rig and seed.
+        Its rig, seed and folder of calibrations.
     mode : str
         How the boards' sweeps are read.
     draw : int
         Picks other noise.
     camera : Pinhole, optional
         Another camera than the default rig's.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made, or holds a damaged calibration.
     """
     rig = configured_rig(config.rig)
     rig = rig if camera is None else replace(rig, camera=camera)
-    rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION - draw]))
-    poses = data_synth.board_poses(config.rig.board_poses)
-    captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
-    return Bench(rig, pipeline.calibrate(data_synth.BOARD, captures, settings=SweepSettings(mode=mode)))
+
+    def calibrate() -> Calibration:
+        rng = np.random.default_rng(np.random.SeedSequence([config.seed, _CALIBRATION - draw]))
+        poses = data_synth.board_poses(config.rig.board_poses)
+        captures = (data_synth.render_board(rig, pose, rng) for pose in poses)
+        return pipeline.calibrate(data_synth.BOARD, captures, settings=SweepSettings(mode=mode))
+
+    if config.calibrations is None:
+        return Bench(rig, calibrate())
+    shape = {name: np.asarray(value).tolist() for name, value in asdict(rig.camera).items()}
+    how = {"rig": asdict(config.rig), "camera": shape, "seed": config.seed, "mode": mode, "draw": draw}
+    return Bench(rig, _kept(Path(config.calibrations), fingerprint(how), calibrate))
+
+
+def _kept(folder: Path, identity: str, calibrate: Callable[[], Calibration]) -> Calibration:
+    """Read a calibration from the folder, or make it and leave it there for the next run."""
+    path = folder / f"{identity}.json"
+    if path.is_file():
+        return read_calibration(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"`calibrations` must be a folder that can be written, got {folder}: {error}.") from error
+    calibration = calibrate()
+    write_calibration(calibration, path)
+    return calibration

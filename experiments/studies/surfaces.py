@@ -14,7 +14,7 @@ from deskew import flattening, metrics
 from deskew.errors import DeskewError, require
 from deskew.io import Mesh, read_mesh, sheet_mesh
 from deskew.types import Flattened, Sheet, Status
-from experiments.reporting import Column, Layout, Plot, Times
+from experiments.reporting import Column, Layout, Plot, Times, Versus
 from experiments.settings import Config
 from experiments.studies.methods import require_methods
 from experiments.studies.study import Study
@@ -63,6 +63,12 @@ class Surfaces(Study):
             Column("relief_mm", "relief [mm]", 1, headline=True),
         ),
         (Plot("flat_rigid_mean_mm", "flat_rigid_mean_mm", "mean distance from the truth, rigidly aligned [mm]"),),
+        versus=Versus(
+            "Each method against ARAP (as rigid as possible, of libigl).",
+            "arap",
+            ("flattened/",),
+            ("flat_rigid_mean_mm", "flat_rigid_max_mm", "flat_mean_mm"),
+        ),
         times=(
             Times(
                 "Time",

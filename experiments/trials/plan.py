@@ -14,14 +14,17 @@ from experiments.trials.schema import TrialKey
 
 # What decides where and how much is computed, and never the value of a row. `trials` may grow: old rows stay good.
 # What is ablated stands in the trial's own key.
-_NO_PART_OF_A_ROW = ("engine", "out", "budget", "trials", "trials_at", "ablations")
+_NO_PART_OF_A_ROW = ("engine", "out", "calibrations", "budget", "trials", "trials_at", "ablations")
 # Keys that belong to one experiment only.
 _SECTIONS = {
     "real_boards": "real_boards",
     "stiffness": "stiffness",
     "surfaces": "surfaces",
     "ocr": "ocr_misses",
+    "sensitivity": "sensitivity",
     "integrators": "integrators",
+    "settling": "settling",
+    "culling": "culling",
 }
 # Sources that rows come from; reporting, the program around it and who carries trials out change no row.
 SOURCES = (
@@ -65,6 +68,8 @@ def settings_of(config: Config, inputs: Mapping[str, Path]) -> dict[str, Any]:
         ("surfaces", "kinds"),
         ("ocr", "real_path"),
         ("ocr", "severities"),
+        ("sensitivity", "slope_p90_deg"),
+        ("sensitivity", "noise_scale"),
     ):
         settings.get(group, {}).pop(key, None)
     return settings
