@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,10 +13,11 @@ from pathlib import Path
 from tqdm import tqdm
 
 from deskew.errors import InputError, StepError
+from deskew.own.confinement import hidden
 from experiments.reporting.export import Results, require_targets, write_report
 from experiments.reporting.provenance import provenance
 from experiments.settings import Config
-from experiments.studies import Study, find_study
+from experiments.studies import Study, about_own, find_study
 from experiments.trials import Engine, Outcome, Processes, Row, Serial, Store, TrialKey, fingerprint, settings_of
 from experiments.trials.engines import one_thread
 
@@ -54,7 +56,8 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
     study = find_study(config.experiment)
     keys = study.plan(config)
     require_targets(out, study.layout)
-    about = study.about(config)
+    own = about_own(config)
+    about = {**study.about(config), **own}
     settings = settings_of(config, study.inputs(config))
     identity = fingerprint({**settings, **about})
     with Store(out, identity) as store:
@@ -62,7 +65,9 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
         finished = store.finished()
         missing = [key for key in keys if key not in finished]
         if missing:
-            _run_missing(study, config, missing, store)
+            # What the trials share is in this process too, and no method of somebody's is to read it there.
+            with hidden() if own else nullcontext():
+                _run_missing(study, config, missing, store)
         prepared = _prepare_key(config)
         results = Results(
             store.rows(keys), store.rows([*keys, prepared], "timing"), store.failures(keys), store.pictures(keys)
