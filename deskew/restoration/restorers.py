@@ -10,7 +10,7 @@ import numpy as np
 from deskew.errors import DeskewError, StepError, in_one_line
 from deskew.plugins import name_of
 from deskew.restoration.warp import view_camera
-from deskew.types import Array, Dewarped, Flattened, Floats, Pinhole, Restoration, Scan, Size
+from deskew.types import WHITE, Array, Dewarped, Flattened, Floats, Pinhole, Restoration, Scan, Size
 
 Restorer = Callable[[Scan], Restoration]
 Dewarper = Callable[[Array], Any]
@@ -39,14 +39,14 @@ def restore_by(restorer: Restorer, scan: Scan) -> Restoration:
     Raises
     ------
     StepError
-        If the function raises or exits, or returns something else: an image of 8 or 16 bits of the camera's size, a
+        If the function raises or exits, or returns something else: an image like the white one, a
         backward map into the camera's picture, NaN outside, and the camera of the view.
     """
     must = _Must(restorer)
     found = must.call(restorer, scan)
     must(isinstance(found, Restoration), "return a Restoration", type(found).__name__)
     view = view_camera(scan.camera)
-    must.image(found.image, view.size)
+    must.image(found.image, scan.images[WHITE], view.size)
     backward_map = must.backward_map(found.backward_map, view.size, scan.camera.size)
     same = isinstance(found.camera, Pinhole) and _same(found.camera, view)
     must(same, "return the camera `restoration.view_camera(scan.camera)`", "another")
@@ -60,7 +60,8 @@ def dewarp_by(dewarper: Dewarper, image: Array) -> Dewarped:
     Parameters
     ----------
     dewarper : callable
-        Takes the image and returns the flat page's, or a pair of that and its backward map.
+        Takes the image and returns the flat page's, grey or coloured and of the type as given, or a pair of that and its
+        backward map.
     image : (height, width[, 3]) array
         As the camera saw the page, of 8 or 16 bits.
 
@@ -74,7 +75,7 @@ def dewarp_by(dewarper: Dewarper, image: Array) -> Dewarped:
     if isinstance(found, Dewarped):
         found = found.image, found.backward_map
     flat, places = found if isinstance(found, tuple) and len(found) == 2 else (found, None)
-    must.image(flat, None)
+    must.image(flat, image, None)
     if places is None:
         return Dewarped(flat)
     return Dewarped(flat, must.backward_map(places, flat.shape[1::-1], image.shape[1::-1]))
@@ -98,11 +99,11 @@ class _Must:
         except (Exception, SystemExit) as error:
             raise StepError(f"Restoration by `{self.name}` failed: {in_one_line(error)}.") from error
 
-    def image(self, image: Any, size: Size | None) -> None:
-        """Require a picture, of a size [px] if that is given."""
-        array = isinstance(image, np.ndarray) and image.dtype in (np.uint8, np.uint16)
-        self(array, "return an image of 8 or 16 bits", getattr(image, "dtype", type(image).__name__))
-        shaped = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
+    def image(self, image: Any, given: Array, size: Size | None) -> None:
+        """Require a picture of the kind that was given, and of a size [px] if there is one."""
+        array = isinstance(image, np.ndarray) and image.dtype == given.dtype
+        self(array, f"return an image of {given.dtype}, as given", getattr(image, "dtype", type(image).__name__))
+        shaped = image.ndim == given.ndim and image.shape[2:] == given.shape[2:]
         height, width = image.shape[:2] if shaped else (0, 0)
         if size is None:
             fits, what = (
@@ -111,7 +112,8 @@ class _Must:
             )
         else:
             fits, what = (width, height) == size, f"of {size[0]} x {size[1]} pixels"
-        self(shaped and fits, f"return an image (height, width[, 3]) {what}", image.shape)
+        channels = "(height, width)" if given.ndim == 2 else "(height, width, 3)"
+        self(shaped and fits, f"return an image {channels} {what}", image.shape)
 
     def backward_map(self, places: Any, size: Size, camera_size: Size) -> Array:
         """Require a backward map of a picture's size whose places lie in the camera's, or are NaN as a whole."""

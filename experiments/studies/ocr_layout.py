@@ -7,6 +7,16 @@ from experiments.reporting import Column, Curve, FigurePage, Layout, Numbers, Se
 _LETTERS = 176
 _PAPER = {"control": "0", "unrestored": "9..18", "restored": "1..3"}
 _PARTS = ("substitutions", "insertions", "deletions", "misses_paper")
+_IMAGE = (
+    "ms_ssim_docunet",
+    "ms_ssim_wang",
+    "ld_dis_px",
+    "ad_dis",
+    "lid_dis_px",
+    "line_straightness_px",
+    "line_spread_deg",
+    "text_lines",
+)
 _WAYS = {"_normalised": "normalised", "_projector": "projector light", "_unshaded": "shading removed"}
 
 
@@ -39,6 +49,14 @@ def _columns() -> tuple[Column, ...]:
         Column("folded_quads", "folded quads", 0),
         Column("slope_p90_deg", "p90 slope [deg]", 1),
         Column("relief_mm", "relief [mm]", 1),
+        Column("ms_ssim_docunet", "MS-SSIM (DocUNet's sum)", 4),
+        Column("ms_ssim_wang", "MS-SSIM (Wang's product)", 4),
+        Column("ld_dis_px", "LD, DIS flow [px]", 3),
+        Column("ad_dis", "AD, DIS flow", 4),
+        Column("lid_dis_px", "Li-D, DIS flow [px]", 3),
+        Column("line_straightness_px", "lines bend by [px]", 3),
+        Column("line_spread_deg", "lines diverge by [deg]", 3),
+        Column("text_lines", "lines found", 1),
         Column("word_recall", "true words read", 3),
         Column("word_precision", "words read that are true", 3),
         Column("words", "true words", 0),
@@ -59,8 +77,9 @@ LAYOUT = Layout(
             "Misses",
             "How bent the sheets are was chosen once on unrestored pages and frozen (docs/adr/0019). `spring` is the "
             "best method, `paper_*` the paper's as a whole, its scan included; `ideal` is the page warped back by its "
-            "true shape: what it misses is light read as marks, which no restoration that keeps the light can help.",
-            _MAIN,
+            "true shape: what it misses is light read as marks, which no restoration that keeps the light can help. "
+            "`null/shuffled` is the true letters in random order: what a reading scores that has nothing but them.",
+            (*_MAIN, "null/shuffled"),
             (
                 "misses",
                 *_PARTS,
@@ -86,6 +105,16 @@ LAYOUT = Layout(
                 "shading_projector_percent",
                 "shading_unshaded_percent",
             ),
+        ),
+        Section(
+            "Image metrics",
+            "What the document-unwarping field reports, from pictures alone, against the control (docs/adr/0026). LD, "
+            "AD and Li-D are by DIS flow, not by the field's SIFT flow, and in pixels of pictures of 149,600 pixels. "
+            "MS-SSIM and LD count where the page lies in the picture, which no method is asked to know; AD, Li-D and "
+            "the lines count its shape. `null/shifted` is the control itself moved by one pixel: what a metric reads "
+            "of a truth that is spoilt.",
+            ("control", "null/shifted", "unrestored", "ideal", "restored"),
+            _IMAGE,
         ),
         Section(
             "Severity",
