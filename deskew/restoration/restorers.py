@@ -60,8 +60,8 @@ def dewarp_by(dewarper: Dewarper, image: Array) -> Dewarped:
     Parameters
     ----------
     dewarper : callable
-        Takes the image and returns the flat page's, grey or coloured and of the type as given, or a pair of that and its
-        backward map.
+        Takes the image and returns the flat page's, grey or coloured and of the type as given, or a pair of that and
+        its backward map.
     image : (height, width[, 3]) array
         As the camera saw the page, of 8 or 16 bits.
 

@@ -158,6 +158,19 @@ def dewarp(image: Array) -> Array:
 
 
 @deskew.dewarper
+def dewarp_with_map(image: Array) -> tuple[Array, Array]:
+    """Return the picture as it is, and say so."""
+    y, x = np.indices(image.shape, dtype=np.float32)
+    return image, np.stack([x, y], axis=-1)
+
+
+@deskew.dewarper
+def dewarp_mirrored(image: Array) -> tuple[Array, Array]:
+    image, places = dewarp_with_map(image)
+    return image[:, ::-1], places[:, ::-1]
+
+
+@deskew.dewarper
 def dewarp_nothing(image: Array) -> Array:
     return image[:0]
 
