@@ -44,7 +44,7 @@ def test_a_method_of_its_own_process_flattens_as_it_would_here(sheet: Sheet) -> 
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("crash", "`tests.own.unruly:crash` crashed with SIGSEGV."),
+        ("crash", "`tests.own.unruly:crash` crashed with SIGSEGV; it last said: not again."),
         ("hoard", "`tests.own.unruly:hoard` ran out of the 1024 MB that it may take."),
         ("tear", "Flattening by `tests.own.unruly:tear` must return finite vertices unless it diverged, got at_rest"),
         ("shorten", "Flattening by `tests.own.unruly:shorten` must keep the shape (9, 11, 3), got (8, 11, 3)."),
@@ -67,9 +67,9 @@ def test_a_method_that_does_not_return_is_a_step_error_in_one_line(sheet: Sheet,
     assert not Path(__file__).with_name("sprung").exists()
 
 
-def test_a_method_that_hangs_is_ended_and_its_last_words_are_kept(sheet: Sheet) -> None:
+def test_a_method_that_hangs_is_ended(sheet: Sheet) -> None:
     start = time.monotonic()
-    with pytest.raises(StepError, match=r"hang` took longer than the 2 s that it may take; it last said: still here\."):
+    with pytest.raises(StepError, match=r"hang` took longer than the 2 s that it may take\."):
         unruly("hang", Limits(seconds=2.0))(sheet)
     assert time.monotonic() - start < 60.0
 
