@@ -16,6 +16,7 @@ from omegaconf import MISSING
 from deskew.errors import InputError, require
 
 BUDGETS = ("smoke", "paper", "full")
+ENGINES = ("processes", "ray", "serial", "slurm")
 SURFACE_KINDS = ("cylinder", "cone", "folds", "mirror", "physical")
 
 
@@ -162,16 +163,38 @@ class AblationSettings(Checked):
     ambient: list[float] = values_of("ambient", [0.1, 0.3])
 
 
+def _address(value: str | None) -> bool:
+    host, _, port = (value or "").rpartition(":")
+    return value is None or (bool(host) and "/" not in host and port.isdecimal() and int(port) < 65536)
+
+
 @dataclass
 class EngineSettings(Checked):
-    """What carries the trials out."""
+    """What carries the trials out.
+
+    `workers`: trials at once; of SLURM, jobs among which the trials are divided.
+    `address`: of a Ray cluster that runs.
+    `cluster`: where submitit runs its jobs, `local` for processes of this machine.
+    `partition`: of SLURM, null for its own choice.
+    `minutes`: after which SLURM may end a job; its longest trial must fit.
+    `folder`: for the jobs' files, on a disk that all nodes share; null for `out`.
+    """
 
     group: ClassVar[str] = "engine."
-    name: str = choice("processes", "serial", "processes")
+    name: str = choice("processes", *ENGINES)
     workers: int | None = setting(
         None,
         "be a whole number in [1, 256], or null for one a core",
         lambda value: value is None or 1 <= value <= 256,
+    )
+    address: str | None = setting(None, "be HOST:PORT of a Ray cluster, or null to start one here", _address)
+    cluster: str = choice("slurm", "slurm", "local")
+    partition: str | None = setting(
+        None, "be a name, or null", lambda value: value is None or bool(value.strip() and value.isprintable())
+    )
+    minutes: int = count(60, 1, 100_000)
+    folder: str | None = setting(
+        None, "be the name of a folder, or null", lambda value: value is None or bool(value and value.isprintable())
     )
 
 
@@ -311,11 +334,56 @@ class SensitivitySettings(Checked):
 
     group: ClassVar[str] = "sensitivity."
     slope_p90_deg: list[float] = several([10.0, 15.0, 25.0, 30.0], 1.0, 45.0, "degrees")
-    noise_scale: list[float] = several([0.5, 2.0, 4.0], 0.0, 10.0, "times the rig's own noise")
+    noise_scale: list[float] = several([0.5, 2.0, 3.0, 4.0], 0.0, 10.0, "times the rig's own noise")
     mesh: list[int] = several([12, 23, 90, 180], 4, 400)
     projector_yaw_deg: list[float] = several([0.02, 0.05, 0.1], -1.0, 1.0, "degrees")
     baseline_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")
-    focal_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")
+    focal_percent: list[float] = several([0.1, 0.25, 0.5], -5.0, 5.0, "%")
+
+
+@dataclass
+class SettlingSettings(Checked):
+    """The paper's particle system on crumpled pages, one of its constants changed at a time.
+
+    `restitutions`: coefficients k_r. `stiffer`: what k_s is multiplied by.
+    `pushes`: weight of a vertex over k_s times a spring's length.
+    `max_steps`: after which a page counts as unfinished; the usual one needs a tenth of them.
+    """
+
+    group: ClassVar[str] = "settling."
+    restitutions: list[float] = setting(
+        [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0],
+        "be a list of different numbers in [0, 1]",
+        lambda values: _numbers(values, 0.0, 1.0),
+    )
+    stiffer: list[float] = setting(
+        [2.0, 20.0, 200.0], "be a list of different numbers in [1, 10000]", lambda values: _numbers(values, 1.0, 1e4)
+    )
+    pushes: list[float] = setting(
+        [0.002, 0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5.0],
+        "be a list of different numbers in [0.00001, 100]",
+        lambda values: _numbers(values, 1e-5, 100.0),
+    )
+    max_steps: int = count(10_000, 200, 1_000_000)
+
+
+@dataclass
+class CullingSettings(Checked):
+    """Epipolar culling of pages at several noise levels, through one calibration made at `rig.noise_scale`.
+
+    `noise_scales`: values of `rig.noise_scale` for the pages.
+    `tolerances_px`: distances from the epipolar line at which points are culled.
+    `outlier_mm`: depth error from which a point is an outlier; 3 mm are some three projector lines.
+    """
+
+    group: ClassVar[str] = "culling."
+    noise_scales: list[float] = values_of("noise_scale", [1.0, 2.0, 4.0])
+    tolerances_px: list[float] = setting(
+        [1.0, 2.0, 4.0],
+        "be a list of different numbers in [0.1, 100] projector px",
+        lambda values: _numbers(values, 0.1, 100.0),
+    )
+    outlier_mm: float = number(3.0, 0.1, 100.0, "mm")
 
 
 @dataclass
@@ -395,6 +463,8 @@ class Config(Checked):
     mesh: MeshSettings = field(default_factory=MeshSettings)
     own: OwnSettings = field(default_factory=OwnSettings)
     integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
+    settling: SettlingSettings = field(default_factory=SettlingSettings)
+    culling: CullingSettings = field(default_factory=CullingSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ocr: ReadingSettings = field(default_factory=ReadingSettings)

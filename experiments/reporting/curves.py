@@ -6,8 +6,10 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean
+from typing import Any
 
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from experiments.reporting.figure_layout import Curve
 from experiments.reporting.statistics import Summary, summarise
@@ -50,6 +52,15 @@ def curve_points(curve: Curve, rows: Sequence[Row]) -> dict[str, list[Point]]:
     return {name: sorted(points, key=lambda point: point.x) for name, points in lines.items()}
 
 
+def label_by_numbers(axis: Any) -> None:
+    """Label a logarithmic axis of three decades at most by plain numbers, with a 2 and a 5 between powers of ten."""
+    low, high = axis.get_view_interval()
+    if high <= 1000 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter(FormatStrFormatter("%g"))
+        axis.set_minor_formatter(NullFormatter())
+
+
 def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
     """Draw the means with their intervals; None without data."""
     lines = curve_points(curve, rows)
@@ -74,6 +85,8 @@ def curve_plot(curve: Curve, rows: Sequence[Row]) -> Figure | None:
     axes.set(xlabel=curve.x_label, ylabel=curve.y_label)
     if curve.log:
         axes.set(xscale="log", yscale="log")
+        label_by_numbers(axes.xaxis)
+        label_by_numbers(axes.yaxis)
     else:
         axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)

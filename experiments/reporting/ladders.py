@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
+from experiments.reporting.curves import label_by_numbers
 from experiments.reporting.figure_layout import Ladder
 from experiments.reporting.pages import Place, PlacePages, pages_by_place
 from experiments.reporting.statistics import compare, summarise
@@ -61,9 +61,7 @@ def _draw_rungs(axes: Any, ladder: Ladder, places: Mapping[Place, PlacePages]) -
         axes.axvline(ladder.paper, color="tab:red", linestyle="--", linewidth=1.0, label=f"the paper: {ladder.paper:g}")
         axes.legend(loc="upper left", frameon=False, fontsize=8)
     axes.set(xscale="log", xlabel=ladder.label, title="one step after another")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    label_by_numbers(axes.xaxis)
     axes.title.set_fontsize(9)
     axes.grid(axis="x", alpha=0.3)
 

@@ -73,8 +73,7 @@ LAYOUT = Layout(
         Section(
             "Mesh and rest lengths",
             "Vertices a side, and each method with the other's rest lengths: chords, or sections along the surface. "
-            "Where noise would lengthen a section it falls back to its chord, which on unfiltered depth it always "
-            "does.",
+            "Where noise would lengthen sections the chords stay (docs/adr/0016): on unfiltered depth as a rule.",
             ("restored", _MESH, *_with_more(_RESTS)),
             _ERRORS,
         ),
@@ -82,7 +81,8 @@ LAYOUT = Layout(
             "Calibration",
             "The page scanned with a calibration that is wrong by so much: the projector turned about its upright "
             "axis, its distance from the camera or the camera's focal length longer. A wrong size does not show in an "
-            "affine alignment.",
+            "affine alignment. Epipolar culling refuses what such a calibration makes of a page, once it is wrong "
+            "enough; a page with holes that no mesh can bridge has failed.",
             ("restored", *_WRONG),
             _ERRORS,
         ),

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from experiments.reporting import Changes, Column, Layout, Tails, Versus
+import pytest
+
+from experiments.reporting import Changes, Column, Ladder, Layout, Tails, Versus
+from experiments.reporting.ladders import ladder_plot
 from experiments.reporting.pages import pages_by_place
 from experiments.reporting.tables import table
-from experiments.reporting.versus import paired
+from experiments.reporting.versus import changed_places, paired
 from experiments.trials import Row, TrialKey
 
 ERROR, KEPT = Column("corner_mean_px", "mean [px]", 2), Column("meets_paper", "kept", share=True)
@@ -59,6 +62,8 @@ def test_a_method_that_always_failed_is_shown_as_such() -> None:
     layout = Layout("T", "N", (ERROR,), versus=Versus("", "theirs", ("restored",), ("corner_mean_px",)))
     rows = [*rows_of("restored", "theirs", {0: 1.0, 1: 2.0}), *failed("restored", "ours", 0, 1)]
     assert "| restored | ours | mean [px] | 0 | 2 (0) | – | – | – | – |" in table(layout, rows, [])
+    none = [*failed("restored", "theirs", 0), *failed("restored", "ours", 0, 1)]
+    assert "| restored | ours | mean [px] | 0 | 2 (1) | – | – | – | – |" in table(layout, none, [])
 
 
 def test_condition_against_condition_keeps_to_the_method() -> None:
@@ -75,6 +80,30 @@ def test_condition_against_condition_keeps_to_the_method() -> None:
     assert "| restored/noise=4 | restored | ours | 0 | 2 (0) | – | – | – |" in lines
     # `theirs` has nothing to be compared with.
     assert not any("theirs" in line for line in lines if line.count("|") == 9)
+
+
+def test_conditions_that_go_on_alike_are_compared_in_the_order_of_their_numbers() -> None:
+    values = {"raw/mesh=9": 2.0, "raw/mesh=90": 1.5, "raw/mesh=180": 1.0, "fine/mesh=9": 1.0, "fine/mesh=90": 1.0}
+    rows = [row for condition, value in values.items() for row in rows_of(condition, "-", {0: value})]
+    places = pages_by_place(rows)
+    assert [condition for condition, _ in places if condition.startswith("raw")] == list(values)[:3]
+    found = list(changed_places((("raw/", "fine/"),), places))
+    assert found == [(("raw/mesh=9", "-"), "fine/mesh=9"), (("raw/mesh=90", "-"), "fine/mesh=90")]
+
+
+def test_a_ladder_shows_what_stands_after_each_step_and_what_each_is_worth() -> None:
+    rungs, worth = (("start", "paper"), ("+ a", "path/1_a"), ("+ b", "best")), (("left out", (("best", "no/a"),)),)
+    ladder = Ladder("steps", "Steps", "corner_mean_px", "error [px]", rungs, worth, paper=0.5)
+    values = {"paper": 4.0, "path/1_a": 2.0, "best": 1.0, "no/a": 3.0}
+    rows = [row for name, value in values.items() for row in rows_of(name, "-", {0: value, 1: 2 * value, 2: value})]
+    figure = ladder_plot(ladder, rows)
+    assert figure is not None
+    left, right = figure.axes
+    assert [text.get_text() for text in left.texts] == ["5.333", "2.667", "1.333"]
+    assert [text.get_text() for text in left.get_yticklabels()] == ["start", "+ a", "+ b"]
+    ((drawn, _, _),) = right.containers
+    assert drawn.get_xdata() == pytest.approx([8 / 3])  # pages: 3 - 1, 6 - 2, 3 - 1
+    assert ladder_plot(ladder, rows_of("no/a", "-", {0: 1.0})) is None
 
 
 def test_tails_say_what_most_pages_keep_below() -> None:

@@ -7,7 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from experiments.settings import AblationSettings, Config, RealBoardsSettings, SheetSettings, allowed_text, known_keys
+from experiments.settings import (
+    AblationSettings,
+    Config,
+    RealBoardsSettings,
+    SensitivitySettings,
+    SheetSettings,
+    allowed_text,
+    known_keys,
+)
 from experiments.trials import fingerprint, plan, settings_of
 
 CONFIG = Config(experiment="fake", trials=3)
@@ -66,6 +74,13 @@ def test_a_section_of_another_experiment_is_no_part() -> None:
 def test_a_longer_list_of_ablations_leaves_old_rows_good() -> None:
     other = replace(CONFIG, ablations=AblationSettings(gamma=[1.0]))
     assert settings_of(other, {}) == settings_of(CONFIG, {})
+
+
+def test_what_is_changed_in_one_trial_counts_and_what_has_trials_of_its_own_does_not() -> None:
+    config = replace(CONFIG, experiment="sensitivity")
+    for changed, counts in (("noise_scale", False), ("slope_p90_deg", False), ("mesh", True)):
+        other = replace(config, sensitivity=SensitivitySettings(**{changed: []}))
+        assert (settings_of(other, {}) != settings_of(config, {})) == counts
 
 
 def test_ranges_are_known_by_dotted_key() -> None:

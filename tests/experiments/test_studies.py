@@ -89,7 +89,20 @@ def test_real_boards_refuse_other_captures(tmp_path: Path, capsys: pytest.Captur
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("name", ["ablations", "corner_distance", "plane_accuracy", "real_boards", "speed"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ablations",
+        "attribution",
+        "corner_distance",
+        "culling",
+        "plane_accuracy",
+        "real_boards",
+        "sensitivity",
+        "settling",
+        "speed",
+    ],
+)
 def test_every_study_documents_its_conditions(name: str) -> None:
     study = find_study(name)
     assert "Conditions\n" in str(type(study).__doc__)
@@ -119,6 +132,16 @@ def test_every_study_documents_its_conditions(name: str) -> None:
         (["experiment=plane_accuracy", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
         (["experiment=ablations", "method=nope"], ("method", "nope")),
         (["experiment=ablations", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
+        (
+            ["experiment=attribution", "method=[spring,paper_euler]"],
+            ("`method`", "two ends", "['spring', 'paper_euler']"),
+        ),
+        (["experiment=attribution", "scan.ink=true"], ("`scan`", "switches it")),
+        (["experiment=sensitivity", "method=[arap]"], ("`method`", "spring, paper_euler, paper_rk4", "arap")),
+        (["experiment=sensitivity", "scan.denoise=true"], ("`scan`", "switches it")),
+        (["experiment=sensitivity", "sheet=physical"], ("`sensitivity.slope_p90_deg`", "[] for sheets that are given")),
+        (["experiment=sensitivity", "mesh.rows=30"], ("`sensitivity.mesh`", "unless mesh.rows equals")),
+        (["experiment=sensitivity", "sensitivity.noise_scale=[1]"], ("`sensitivity.noise_scale`", "leave out 1,")),
         (["experiment=real_boards", "sheet.paths=[no.npz]"], ("`sheet.paths`", "left out", "no.npz")),
         (["experiment=real_boards", "trials=6"], ("`trials`", "at most 5", "got 6")),
         (["experiment=real_boards", "real_boards.path=/no/such"], ("`real_boards.path`", "be a folder", "/no/such")),
