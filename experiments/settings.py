@@ -322,6 +322,25 @@ class SettlingSettings(Checked):
 
 
 @dataclass
+class CullingSettings(Checked):
+    """Epipolar culling of pages at several noise levels, through one calibration made at `rig.noise_scale`.
+
+    `noise_scales`: values of `rig.noise_scale` for the pages.
+    `tolerances_px`: distances from the epipolar line at which points are culled.
+    `outlier_mm`: depth error from which a point is an outlier; 3 mm are some three projector lines.
+    """
+
+    group: ClassVar[str] = "culling."
+    noise_scales: list[float] = values_of("noise_scale", [1.0, 2.0, 4.0])
+    tolerances_px: list[float] = setting(
+        [1.0, 2.0, 4.0],
+        "be a list of different numbers in [0.1, 100] projector px",
+        lambda values: _numbers(values, 0.1, 100.0),
+    )
+    outlier_mm: float = number(3.0, 0.1, 100.0, "mm")
+
+
+@dataclass
 class DecodersSettings(Checked):
     """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
 
@@ -380,6 +399,7 @@ class Config(Checked):
     mesh: MeshSettings = field(default_factory=MeshSettings)
     integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
     settling: SettlingSettings = field(default_factory=SettlingSettings)
+    culling: CullingSettings = field(default_factory=CullingSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ocr: ReadingSettings = field(default_factory=ReadingSettings)

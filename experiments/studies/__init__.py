@@ -19,6 +19,7 @@ STUDIES = {
     "surfaces": "experiments.studies.surfaces:Surfaces",
     "integrators": "experiments.studies.integrators:Integrators",
     "settling": "experiments.studies.settling:Settling",
+    "culling": "experiments.studies.culling:Culling",
     "speed": "experiments.studies.speed:Speed",
 }
 

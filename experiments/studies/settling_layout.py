@@ -78,19 +78,6 @@ LAYOUT = Layout(
     ),
     shares=(
         Shares(
-            "restitution",
-            "How crumpled pages of 15 to 40 degrees end, by the coefficient of restitution",
-            "k_r",
-            "restitution/k_r=",
-            (
-                ("flat", "tab:green"),
-                ("locked", "tab:orange"),
-                ("folded", "tab:red"),
-                ("unfinished", "tab:gray"),
-                ("diverged", "black"),
-            ),
-        ),
-        Shares(
             "energy_alone",
             "What a run is stopped on by its energy alone, by the strength of the push",
             "push: m g / (k r)",

@@ -23,6 +23,7 @@ _SECTIONS = {
     "ocr": "ocr_misses",
     "integrators": "integrators",
     "settling": "settling",
+    "culling": "culling",
 }
 # Sources that rows come from; reporting and the program around it change no row.
 SOURCES = (
