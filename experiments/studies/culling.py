@@ -38,7 +38,7 @@ _CHOICES: Mapping[str, DepthSettings] = {
     "others": replace(_GATES, epipolar_tolerance_px=1e9),
     "all": _GATES,
 }
-_PICTURED = 3
+_PICTURED = 2
 
 
 class Culling(Study):
