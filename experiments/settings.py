@@ -319,6 +319,51 @@ class SensitivitySettings(Checked):
 
 
 @dataclass
+class SettlingSettings(Checked):
+    """The paper's particle system on crumpled pages, one of its constants changed at a time.
+
+    `restitutions`: coefficients k_r. `stiffer`: what k_s is multiplied by.
+    `pushes`: weight of a vertex over k_s times a spring's length.
+    `max_steps`: after which a page counts as unfinished; the usual one needs a tenth of them.
+    """
+
+    group: ClassVar[str] = "settling."
+    restitutions: list[float] = setting(
+        [0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0],
+        "be a list of different numbers in [0, 1]",
+        lambda values: _numbers(values, 0.0, 1.0),
+    )
+    stiffer: list[float] = setting(
+        [2.0, 20.0, 200.0], "be a list of different numbers in [1, 10000]", lambda values: _numbers(values, 1.0, 1e4)
+    )
+    pushes: list[float] = setting(
+        [0.002, 0.005, 0.015, 0.05, 0.15, 0.5, 1.5, 5.0],
+        "be a list of different numbers in [0.00001, 100]",
+        lambda values: _numbers(values, 1e-5, 100.0),
+    )
+    max_steps: int = count(10_000, 200, 1_000_000)
+
+
+@dataclass
+class CullingSettings(Checked):
+    """Epipolar culling of pages at several noise levels, through one calibration made at `rig.noise_scale`.
+
+    `noise_scales`: values of `rig.noise_scale` for the pages.
+    `tolerances_px`: distances from the epipolar line at which points are culled.
+    `outlier_mm`: depth error from which a point is an outlier; 3 mm are some three projector lines.
+    """
+
+    group: ClassVar[str] = "culling."
+    noise_scales: list[float] = values_of("noise_scale", [1.0, 2.0, 4.0])
+    tolerances_px: list[float] = setting(
+        [1.0, 2.0, 4.0],
+        "be a list of different numbers in [0.1, 100] projector px",
+        lambda values: _numbers(values, 0.1, 100.0),
+    )
+    outlier_mm: float = number(3.0, 0.1, 100.0, "mm")
+
+
+@dataclass
 class DecodersSettings(Checked):
     """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
 
@@ -382,6 +427,8 @@ class Config(Checked):
     scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
     integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
+    settling: SettlingSettings = field(default_factory=SettlingSettings)
+    culling: CullingSettings = field(default_factory=CullingSettings)
     decoders: DecodersSettings = field(default_factory=DecodersSettings)
     real_boards: RealBoardsSettings = field(default_factory=RealBoardsSettings)
     ocr: ReadingSettings = field(default_factory=ReadingSettings)

@@ -20,6 +20,7 @@ from deskew.acquisition.corners import (
 from deskew.acquisition.decoding import DecoderSettings, decode, settings_for_ink
 from deskew.acquisition.denoise import DenoiseSettings, denoise_depth, depth_noise
 from deskew.acquisition.depthmap import DepthSettings, depth_map
+from deskew.acquisition.epipolar import epipolar_distance
 from deskew.acquisition.graycode import GrayCodeSettings, decode_gray
 from deskew.acquisition.grey import grey_levels
 from deskew.acquisition.ink import InkSettings, correct_ink
@@ -32,6 +33,7 @@ from deskew.acquisition.phase import PhaseSettings, decode_phase
 from deskew.acquisition.spheres import Probing, Sphere, fit_sphere, probe_sphere, spacing_error_mm
 from deskew.acquisition.stripes import decode_sweep
 from deskew.acquisition.sweep import SweepSettings
+from deskew.acquisition.triangulation import triangulate
 
 __all__ = [
     "DISCARDED_SHARE",
@@ -60,6 +62,7 @@ __all__ = [
     "depth_map",
     "depth_noise",
     "depth_points",
+    "epipolar_distance",
     "find_board",
     "fit_plane",
     "fit_sphere",
@@ -80,5 +83,6 @@ __all__ = [
     "settings_for_ink",
     "spacing_error_mm",
     "straight_outline",
+    "triangulate",
     "view_board",
 ]

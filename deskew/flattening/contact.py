@@ -12,6 +12,8 @@ working
     good steps the step doubles again, up to the stable one.
 literal
     A step is rejected while any particle is below 0, and the step never grows. Kept as a demonstrated failure.
+
+A third way, "none", halves nothing and lifts and reflects as `working` does: it shows what halving is for.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from typing import NamedTuple
 
 from numba import njit, uintp
 
-READINGS = ("working", "literal")
+READINGS = ("working", "literal", "none")
 # Slower than gravity makes a particle in this many steps, it is taken to rest on the plane.
 RESTING_STEPS = 5.0
 # Good steps after which a halved step doubles again.
@@ -59,6 +61,15 @@ def sunk(z, plane):  # type: ignore[no-untyped-def]
     for i in range(uintp(z.shape[0])):
         count += z[i] < lowest
     return count
+
+
+@njit(cache=True, error_model="numpy")
+def deepest(z, so_far):  # type: ignore[no-untyped-def]
+    """Return the lowest of the heights z : (V,) and of `so_far` [mm], however many are no number."""
+    for i in range(uintp(z.shape[0])):
+        if z[i] < so_far:
+            so_far = z[i]
+    return so_far
 
 
 @njit(cache=True, error_model="numpy")

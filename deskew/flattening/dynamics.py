@@ -37,7 +37,7 @@ DT_SAFETY = 0.9
 # Implicit Euler has no limit: its step, in units of the longest that explicit Euler may ever make, 2 / sqrt(lam_max).
 DT_IMPLICIT = 4.0
 # The step is never halved further than this share of the full one; literal halving goes on until it is absurd.
-DT_FLOOR = {"working": 2.0**-10, "literal": 1e-12}
+DT_FLOOR = {"working": 2.0**-10, "literal": 1e-12, "none": 1.0}
 
 _DRAG = 3.0
 _SINKING = 0.5
@@ -155,8 +155,8 @@ def settle(sheet: Sheet, integrator: Scheme | Outside, settings: ParticleSetting
     Flattened
         With counters `steps`, `steps_rejected`, `force_evaluations`, `contacts`, `folded_quads`, `spring_energy` [uJ],
         `kinetic_energy` [uJ], `height_max_mm` (before z is set to 0 on `AT_REST`), `dt`, `dt_smallest` and `time` [s],
-        and the constants chosen: `k_d` [kg/s], `gravity`, `weak_gravity` [mm/s^2] and `drag`
-        [kg/s]; and with its `history`.
+        `penetration_mm` (how deep a step brought a particle below the plane, before contact lifted it), and the
+        constants chosen: `k_d` [kg/s], `gravity`, `weak_gravity` [mm/s^2] and `drag` [kg/s]; and with its `history`.
 
     Raises
     ------
@@ -260,6 +260,7 @@ def _counters(run: Run, springs: Springs, constants: Constants) -> dict[str, flo
         "height_max_mm": float(run.x[2].max()),
         "dt": constants.pace.dt_max,
         "dt_smallest": float(run.clock[2]),
+        "penetration_mm": 0.0 - float(run.lowest[0]),
         "time": float(run.clock[1]),
         "k_d": physics.beta * springs.k_max,
         "gravity": physics.gravity,

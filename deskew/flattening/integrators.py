@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, uintp
 
-from deskew.flattening.contact import GOOD_STEPS, collide, sunk
+from deskew.flattening.contact import GOOD_STEPS, collide, deepest, sunk
 from deskew.flattening.forces import accelerate, scratch
 from deskew.flattening.implicit import N_KRYLOV, implicit_euler
 from deskew.flattening.schemes import Scheme
@@ -28,6 +28,8 @@ class Run(NamedTuple):
         Step in use, time since the start, smallest step made [s].
     counts : (5,) int array
         Steps, steps rejected, force evaluations, contacts, good steps since the last halving.
+    lowest : (1,) array
+        Lowest height that a step made has brought a particle to, before contact lifted it [mm].
     accelerations : (S, 3, V) array
         Of the stages [mm/s^2].
     stage : (2, 3, V) array
@@ -42,6 +44,7 @@ class Run(NamedTuple):
     v: Array
     clock: Array
     counts: Array
+    lowest: Array
     accelerations: Array
     stage: Array
     krylov: Array
@@ -72,8 +75,9 @@ def start(vertices: Array, scheme: Scheme, dt: float) -> Run:
     x = np.array(vertices.reshape(-1, 3).T, dtype=np.float64, order="C")
     accelerations = np.zeros((len(scheme.c), *x.shape))
     krylov = np.zeros((N_KRYLOV, 3, x.shape[1] if scheme.implicit else 0))
-    clock, counts = np.array([dt, 0.0, dt]), np.zeros(5, np.int64)
-    return Run(x, np.zeros_like(x), clock, counts, accelerations, np.zeros((2, *x.shape)), krylov, scratch())
+    clock, counts, lowest = np.array([dt, 0.0, dt]), np.zeros(5, np.int64), np.zeros(1)
+    v, stage = np.zeros_like(x), np.zeros((2, *x.shape))
+    return Run(x, v, clock, counts, lowest, accelerations, stage, krylov, scratch())
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,6 +170,7 @@ def finish(run, physics, plane, pace, h, growth):  # type: ignore[no-untyped-def
 
     An error estimate lets the next step be `growth` times this one; 0 stands for none: halved steps double again.
     """
+    run.lowest[0] = deepest(run.x[2], run.lowest[0])
     struck = collide(run.x[2], run.v[2], plane, physics.gravity, h)
     run.counts[CONTACTS] += struck
     run.counts[STEPS] += 1

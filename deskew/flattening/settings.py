@@ -150,7 +150,7 @@ class ParticleSettings:
     max_steps : int
         Steps after which the sheet counts as locked, in [1, 1e9].
     halving : str
-        Reading of the paper's step halving, "working" or "literal" (see `contact`).
+        Reading of the paper's step halving, "working" or "literal", or "none" at all (see `contact`).
     tolerance_mm : float
         Error that an embedded pair may estimate for a step of any coordinate [mm], > 0; it chooses its steps by that,
         up to `dt`. Other integrators make equal steps.

@@ -111,7 +111,9 @@ def shares_plot(shares: Shares, rows: Sequence[Row]) -> Figure | None:
         bottom = np.zeros(len(conditions))
         for metric, colour in shares.metrics:
             share = np.array([fmean(values.get((c, method, metric), (0.0,))) for c in conditions])
-            axes.bar(range(len(conditions)), share, bottom=bottom, color=colour, width=0.85, label=metric)
+            axes.bar(
+                range(len(conditions)), share, bottom=bottom, color=colour, width=0.85, label=metric.replace("_", " ")
+            )
             bottom += share
         axes.set_xticks(range(len(conditions)), [f"{_number(condition):g}" for condition in conditions])
         axes.set(ylim=(0, 1), ylabel="share of the pages", title=method)

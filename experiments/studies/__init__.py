@@ -20,6 +20,8 @@ STUDIES = {
     "real_boards": "experiments.studies.real_boards:RealBoards",
     "surfaces": "experiments.studies.surfaces:Surfaces",
     "integrators": "experiments.studies.integrators:Integrators",
+    "settling": "experiments.studies.settling:Settling",
+    "culling": "experiments.studies.culling:Culling",
     "speed": "experiments.studies.speed:Speed",
 }
 

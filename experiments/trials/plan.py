@@ -23,6 +23,8 @@ _SECTIONS = {
     "ocr": "ocr_misses",
     "sensitivity": "sensitivity",
     "integrators": "integrators",
+    "settling": "settling",
+    "culling": "culling",
 }
 # Sources that rows come from; reporting and the program around it change no row.
 SOURCES = (

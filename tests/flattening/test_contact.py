@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from deskew.flattening.contact import Plane, collide, sunk
+from deskew.flattening.contact import Plane, collide, deepest, sunk
 from deskew.flattening.integrators import CONTACTS, REJECTED, Pace, Run, advance, start
 from deskew.flattening.schemes import INTEGRATORS
 from tests.flattening.bent_sheets import free_particles
@@ -30,6 +30,13 @@ def test_only_particles_below_eps_have_the_step_halved() -> None:
     z = np.array([-0.06, -0.04, 0.0, 1.0])
     assert sunk(z, Plane(0.05, 0.1, False)) == 1
     assert sunk(z, Plane(0.05, 0.1, True)) == 2
+
+
+def test_the_deepest_height_is_kept_and_no_number_is_passed_over() -> None:
+    z = np.array([0.5, -0.02, np.nan, -0.3, 1.0])
+    assert deepest(z, 0.0) == -0.3
+    assert deepest(z, -0.4) == -0.4
+    assert deepest(np.array([np.nan, 0.2]), 0.0) == 0.0
 
 
 @pytest.mark.parametrize("integrator", ["euler", "rk4"])

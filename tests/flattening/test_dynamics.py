@@ -55,6 +55,23 @@ def test_particles_with_the_papers_integrators_are_the_papers_methods() -> None:
         assert np.array_equal(flatten(sheet, method=method).vertices, same.vertices)
 
 
+def test_halving_keeps_particles_above_minus_eps_and_without_it_they_go_deep() -> None:
+    sheet = Sheet(mirror_folds(3)[0])
+    halved, not_halved = (flatten(sheet, method="paper_euler", halving=halving) for halving in ("working", "none"))
+    assert 0 < halved.counters["penetration_mm"] <= 0.05
+    assert halved.counters["steps_rejected"] > 0
+    assert not_halved.counters["steps_rejected"] == 0
+    assert not_halved.counters["penetration_mm"] > 1.0
+    # It is lifted all the same: where the springs have the least energy does not depend on the way there.
+    assert rigid_error(not_halved.vertices[..., :2], halved.vertices[..., :2]).max() < 0.01
+
+
+def test_literal_halving_lets_no_particle_below_the_plane_and_does_not_end() -> None:
+    result = flatten(Sheet(mirror_folds(3)[0]), method="paper_euler", halving="literal", max_steps=2_000)
+    assert result.counters["penetration_mm"] == 0.0
+    assert result.status is Status.LOCKED
+
+
 def test_history_tells_how_the_push_became_flatness() -> None:
     history = flatten(Sheet(mirror_folds(3)[0]), method="paper_euler").history
     assert (np.diff(history["time_s"]) > 0).all()
