@@ -1,4 +1,4 @@
-"""The command that compares a flattening by any program with the truth: `score`."""
+"""The command that compares what any program made of a page with the truth, a flattening or a picture: `score`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from deskew.cli.options import Json
+from deskew.cli.pictures import PICTURES
 from deskew.cli.printing import report, say
 from deskew.errors import require
 
@@ -19,19 +20,28 @@ _ROUNDED_MM = 1e-3  # what writing a texture with few digits may change
 
 FlatFile = Annotated[
     Path,
-    typer.Argument(metavar="FLAT", help="Flattened mesh in mm: OBJ, texture coordinates if present, else x y; or PLY."),
+    typer.Argument(
+        metavar="FLAT",
+        help="Flattened mesh in mm: OBJ, texture coordinates if present, else x y; or PLY. Or a restored picture: "
+        ".png or .tif.",
+    ),
 ]
 TruthFile = Annotated[
-    Path, typer.Option("--truth", "-t", help="OBJ of the bent mesh, its texture coordinates the true flat places [mm].")
+    Path,
+    typer.Option(
+        "--truth",
+        "-t",
+        help="OBJ of the bent mesh, its texture coordinates the true flat places [mm]; of a picture, the flat page's.",
+    ),
 ]
 
 
 def score(flat_file: FlatFile, truth_file: TruthFile, as_json: Json = False) -> None:
-    """Score a flattening made by any program: distance from the truth, stretch against the bent surface, flips.
+    """Score what any program made of a page against the truth: a flattening, or a restored picture.
 
-    Both files hold the same vertices in the same order, and the same faces. The true v may run up or down. The
-    flattening shows the surface from above, or from the front of its faces if it lies neither up nor down; one that
-    is mirrored is an error, code 3.
+    Of a flattening: distance from the truth, stretch against the bent surface, flips. Both files hold the same vertices
+    in the same order, and the same faces. The true v may run up or down. The flattening shows the surface from above,
+    or from the front of its faces if it lies neither up nor down; one that is mirrored is an error, code 3.
 
     Figures: flat_mean_mm and flat_max_mm after an affine fit, flat_rigid_mean_mm and flat_rigid_max_mm after a rigid
     one; stretch_l2 and stretch_linf of the map from the plane to the surface (Sander 2001), stretch_inverse_l2 and
@@ -39,10 +49,22 @@ def score(flat_file: FlatFile, truth_file: TruthFile, as_json: Json = False) -> 
     area_error, the mean relative change of area; angle_mean_deg; flips, the number of faces turned over; folds, the
     number of edges along which the sheet folds over.
 
+    Of a picture, against a scan of the flat page cut to the same part of it: ms_ssim_docunet, the document-unwarping
+    field's MS-SSIM, and ms_ssim_wang, that of Wang and others 2003; ld_dis_px, ad_dis and lid_dis_px, local, aligned
+    and line distortion by DIS flow; text_lines found in the restored picture, and line_straightness_px and
+    line_spread_deg of them.
+
     Example: deskew score flat.obj --truth page.obj --json
+
+    Example: deskew score restored.png --truth scan.png
     """
     from deskew import io
 
+    suffix, known = flat_file.suffix.lower(), (*io.MESH_SUFFIXES, *PICTURES)
+    require(suffix in known, str(flat_file), f"end in one of {', '.join(known)}", suffix or "no suffix")
+    if suffix in PICTURES:
+        _score_picture(flat_file, truth_file, as_json)
+        return
     truth, flat = io.read_mesh(truth_file), io.read_mesh(flat_file)
     require(truth.texture is not None, str(truth_file), "hold texture coordinates, the flat places [mm]", "none")
     n = len(truth.vertices)
@@ -58,6 +80,17 @@ def score(flat_file: FlatFile, truth_file: TruthFile, as_json: Json = False) -> 
     figures = metrics.score_flattening(truth.sheet, truth.texture, places, same_axes=by_texture)
     head = {"flat": str(flat_file), "truth": str(truth_file), "places": "texture" if by_texture else "xy"}
     report({**head, "vertices": n, "faces": len(truth.faces), **figures}, as_json)
+
+
+def _score_picture(restored_file: Path, scan_file: Path, as_json: bool) -> None:
+    """Compare a restored picture with a scan of the flat page."""
+    from deskew import io
+
+    restored, scan = io.read_image(restored_file), io.read_image(scan_file)
+    from deskew import metrics
+
+    figures = metrics.image_figures(restored, scan)
+    report({"restored": str(restored_file), "truth": str(scan_file), **figures}, as_json)
 
 
 def _carried_along(flat: Mesh, truth: Mesh) -> bool:

@@ -6,10 +6,15 @@ from deskew.metrics.coverage import page_coverage
 from deskew.metrics.dense import dense_error
 from deskew.metrics.depth import depth_error
 from deskew.metrics.difference import image_difference, laid_onto
+from deskew.metrics.distortion import flow_distortion
+from deskew.metrics.images import image_figures
 from deskew.metrics.misses import Misses, count_misses, match_words
+from deskew.metrics.nulls import shifted, shuffled
 from deskew.metrics.ocr import OcrEngine, OcrSettings, ocr_engine
 from deskew.metrics.regions import region_error
 from deskew.metrics.score import score_flattening
+from deskew.metrics.similarity import ms_ssim
+from deskew.metrics.straightness import line_straightness
 from deskew.metrics.strain import flat_error, sheet_strain
 from deskew.metrics.stretch import sheet_stretch
 
@@ -25,13 +30,19 @@ __all__ = [
     "fit_affine",
     "fit_rigid",
     "flat_error",
+    "flow_distortion",
     "image_difference",
+    "image_figures",
     "laid_onto",
+    "line_straightness",
     "match_words",
+    "ms_ssim",
     "ocr_engine",
     "page_coverage",
     "region_error",
     "score_flattening",
     "sheet_strain",
     "sheet_stretch",
+    "shifted",
+    "shuffled",
 ]

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 from rapidfuzz.distance import Levenshtein
 
+from deskew.errors import require
+
 
 @dataclass(frozen=True, slots=True)
 class Misses:
@@ -32,8 +34,17 @@ class Misses:
 
     @property
     def total(self) -> int:
-        """All three together: the Levenshtein distance, `letters` times the character error rate."""
+        """All three together: the Levenshtein distance, which the field calls edit distance (ED)."""
         return self.substitutions + self.insertions + self.deletions
+
+    @property
+    def character_error_rate(self) -> float:
+        """The field's CER: the edit distance over the letters of the true text; above 1 if much is inserted.
+
+        Of the true text and not of a reading of its scan, which would forgive whatever the machine misreads on both.
+        """
+        require(self.letters > 0, "true", "hold letters for a character error rate", "none")
+        return self.total / self.letters
 
     @property
     def paper(self) -> int:

@@ -64,6 +64,9 @@ class OcrMisses(Study):
         The crumpled page warped back by its true shape: the misses that no scan and no flattening can help.
     `unrestored/slope=S`, `restored/slope=S`, `ideal/slope=S`
         The same at a further severity of `ocr.severities`; trial i has trial i's words and folds, bent more or less.
+    `null/shifted`, `null/shuffled`
+        What the metrics read of the truth itself, spoilt: the control's picture one pixel aside, the true letters in
+        random order.
     `real/flat`, `real/crumpleseasy`, `real/crumpleshard`, ...
         Photographs of real documents, a trial a document; nobody knows their shape, so nothing is restored.
 
@@ -71,7 +74,8 @@ class OcrMisses(Study):
     -------
     `misses` and its parts are of the picture as it is. `..._normalised` are of the same picture divided by its local
     white, `..._projector` of the page under the projector's hard light instead of the soft one, and `..._unshaded` of
-    that with its shading removed by the scanned shape and the calibrated projector.
+    that with its shading removed by the scanned shape and the calibrated projector. Image metrics are of the soft light
+    and of the control's cut, against the control; further severities have no control and none of them.
     """
 
     layout: ClassVar[Layout] = LAYOUT
@@ -117,9 +121,9 @@ class OcrMisses(Study):
             config = replace(config, sheet=replace(config.sheet, slope_p90_deg=slope))
         trial = _Trial(config, shared, key)
         trial.scan()
-        trial.measure_unrestored()
         if not trial.at:
             trial.measure_control()
+        trial.measure_unrestored()
         if config.ocr.restore:
             trial.measure_ideal()
         for recipe in trial.scans:
@@ -144,6 +148,7 @@ class _Trial:
             )
         self.reader = PageReader(shared.engine, self.page, restoration.view_camera(self.camera))
         self.scans: dict[Recipe, Scan] = {}
+        self.control: Array | None = None  # as cut for the reader
         self.pixels: Floats = restoration.undistortion_map(self.camera).astype(np.float64)
 
     def scan(self) -> None:
@@ -183,7 +188,13 @@ class _Trial:
         )
         images = {WHITE: flat.white, UNSHADED: unshaded, **flat.textures}
         self.record.add("control", "-", self._read_as_it_lies("control", images, truth))
-        self._picture("control", restoration.undistorted_view(flat.textures[SOFT.name], self.camera))
+        seen = restoration.undistorted_view(flat.textures[SOFT.name], self.camera)
+        self._picture("control", seen)
+        self.control = self.reader.cut(seen)
+        self.record.add("control", "-", metrics.line_straightness(self.control))
+        beside = metrics.shifted(self.control, 1)
+        self.record.add("null/shifted", "-", metrics.image_figures(beside, self.control))
+        self.record.add("null/shuffled", "-", self.reader.shuffled_misses(self.rng))
 
     def measure_ideal(self) -> None:
         """Restore the page by its true shape: what is missed there is the light's and the machine's own."""
@@ -229,6 +240,9 @@ class _Trial:
             if light in views and not self.at:
                 figures |= self.reader.misses(views[light], suffix)
                 figures[f"shading{suffix}_percent"] = shading_percent(views[light], blank)
+        if self.control is not None:
+            with self.record.stage("image_metrics", condition, method):
+                figures |= metrics.image_figures(self.reader.cut(soft), self.control)
         return figures
 
     def _picture(self, name: str, image: Array) -> None:

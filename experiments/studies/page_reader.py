@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from data_synth import Lettered
 from deskew import metrics, projection, restoration
-from deskew.metrics import OcrEngine
+from deskew.metrics import Misses, OcrEngine
 from deskew.types import Array, Floats, Pinhole
 
 INSET_MM = 6.0
@@ -52,12 +52,15 @@ class PageReader:
 
     def misses(self, image: Array, suffix: str = "") -> dict[str, float]:
         """Read a picture and count `misses` and its parts; `letters` and `error_rate_percent` too."""
-        found = metrics.count_misses(self.engine.read(self.cut(image), self.capital_px), " ".join(self.page.words))
-        figures = found.figures(suffix)
-        if not suffix:
-            rate = 100.0 * found.total / found.letters
-            figures |= {"letters": found.letters, "error_rate_percent": rate, "without_miss": float(found.total == 0)}
-        return figures
+        found = self._count(self.engine.read(self.cut(image), self.capital_px))
+        return found.figures(suffix) if suffix else _counts(found)
+
+    def shuffled_misses(self, rng: np.random.Generator) -> dict[str, float]:
+        """Count the misses of the true letters in random order: what a reading scores that has nothing but them."""
+        return _counts(self._count(metrics.shuffled(" ".join(self.page.words), rng)))
+
+    def _count(self, read: str) -> Misses:
+        return metrics.count_misses(read, " ".join(self.page.words))
 
     def normalised_misses(self, image: Array) -> dict[str, float]:
         """Read a picture divided by its local white; `misses_normalised` and its parts."""
@@ -73,6 +76,15 @@ class PageReader:
         side = np.full(pixels.size, 2 * _BLANK_MM)
         inside[pixels] = self.page.lettering.coverage(u[pixels], v[pixels], side, side) == 0.0
         return np.asarray(inside.reshape(true_uv.shape[:2]))
+
+
+def _counts(found: Misses) -> dict[str, float]:
+    rate = 100.0 * found.character_error_rate
+    return found.figures() | {
+        "letters": float(found.letters),
+        "error_rate_percent": rate,
+        "without_miss": float(found.total == 0),
+    }
 
 
 def shading_percent(image: Array, blank: npt.NDArray[np.bool_]) -> float:

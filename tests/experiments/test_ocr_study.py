@@ -88,6 +88,18 @@ def test_restored_pages_are_read_as_the_control_is(tmp_path: Path, photographs: 
         # Known shape and projector leave a fraction of the shading.
         assert 0.0 < figures["shading_unshaded_percent"] < 0.4 * figures["shading_projector_percent"]
     assert 39.0 < unrestored["slope_p90_deg"] < 41.0
+    null, ideal = rows["null/shifted", "-"], rows["ideal", "-"]
+    for name in ("ms_ssim_docunet", "ms_ssim_wang"):
+        assert 0.1 < unrestored[name] < restored[name] < null[name] < 1.0
+        assert restored[name] < ideal[name]
+    # The control's picture of 561 x 429 pixels is enlarged by 1.58, and the flow halves it.
+    assert null["ld_dis_px"] == pytest.approx(1.577 / 2, abs=0.02)
+    assert null["ad_dis"] < 0.01
+    assert 0.0 < ideal["ad_dis"] < restored["ad_dis"] < 0.2 * unrestored["ad_dis"]
+    assert 0.0 < control["line_straightness_px"] < 0.3 < unrestored["line_straightness_px"]
+    assert restored["line_straightness_px"] < 0.5 * unrestored["line_straightness_px"]
+    assert restored["text_lines"] == control["text_lines"] > 5
+    assert 70.0 < rows["null/shuffled", "-"]["error_rate_percent"] < 95.0
     assert rows["real/flat", "-"] == {"words": 6.0, "word_recall": 1.0, "word_precision": 1.0}
     assert rows["real/crumpleshard", "-"]["word_recall"] == 0.0
     run = json.loads((tmp_path / "out" / "run.json").read_text())
@@ -110,6 +122,8 @@ def test_severities_are_read_unrestored_alone_and_both_engines_agree_on_the_cont
         assert json.loads((out / "run.json").read_text())["ocr"]["engine"] == engine
         assert set(found[engine]) == {
             ("control", "-"),
+            ("null/shifted", "-"),
+            ("null/shuffled", "-"),
             ("unrestored", "-"),
             ("unrestored/slope=44", "-"),
         }

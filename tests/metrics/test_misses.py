@@ -5,6 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rapidfuzz.distance import Levenshtein
 
+from deskew.errors import InputError
 from deskew.metrics import count_misses, match_words
 from deskew.metrics.misses import Misses
 
@@ -62,6 +63,38 @@ def test_the_counts_are_an_alignment_with_the_fewest_edits(read: str, true: str)
     tags = [edit.tag for edit in Levenshtein.editops(true, read)]
     assert found.substitutions >= tags.count("replace")
     assert min(found.substitutions, found.insertions, found.deletions) >= 0
+
+
+def plain_edits(read: str, true: str) -> tuple[int, int]:
+    """Fewest edits, and the fewest insertions and deletions of alignments with so few (Wagner and Fischer)."""
+    row = [(j, j) for j in range(len(read) + 1)]
+    for i, wanted in enumerate(true, 1):
+        before, row = row, [(i, i)]
+        for j, found in enumerate(read, 1):
+            edits, unpaired = before[j - 1]
+            (up, up_unpaired), (left, left_unpaired) = before[j], row[-1]
+            row.append(
+                min((edits + (wanted != found), unpaired), (up + 1, up_unpaired + 1), (left + 1, left_unpaired + 1))
+            )
+    return row[-1]
+
+
+@settings(deadline=None)
+@given(texts, texts)
+def test_the_counts_are_those_of_a_plain_dynamic_program(read: str, true: str) -> None:
+    """A substitution that costs nothing, or as much as two edits, gives other counts."""
+    found = count_misses(read, true)
+    assert (found.total, found.insertions + found.deletions) == plain_edits(read, true)
+
+
+def test_the_character_error_rate_is_of_the_true_text() -> None:
+    assert count_misses("HELLO WORLD!!", "HELLO WORLD").character_error_rate == pytest.approx(0.2)
+    assert count_misses("HELLO", "HELLO WORLD").character_error_rate == pytest.approx(0.5)
+    assert count_misses("XXXXX", "HELLO").character_error_rate == 1.0
+    assert count_misses("hello", "HELLO").character_error_rate == 1.0
+    assert count_misses("A NOISY PAGE", "A").character_error_rate == 9.0
+    with pytest.raises(InputError, match="`true` must hold letters"):
+        _ = count_misses("A", " ").character_error_rate
 
 
 def test_the_papers_count_leaves_deletions_out() -> None:
