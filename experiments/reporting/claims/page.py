@@ -10,7 +10,7 @@ from experiments.reporting.claims.claim import Claim, Line
 from experiments.reporting.claims.measures import Evidence, Measure, MissingError
 from experiments.reporting.claims.paper import UNTESTED
 from experiments.reporting.claims.rules import Figure, Rule, Verdict
-from experiments.reporting.tables import markdown_table
+from experiments.reporting.markdown import markdown_table
 
 _NONE = "–"
 _HEAD = """# The paper's claims
