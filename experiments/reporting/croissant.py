@@ -1,9 +1,8 @@
 """What the result tables hold, for machines: Croissant metadata of every committed `results.csv`.
 
-    python -m experiments.reporting.croissant
-
-writes `reports/croissant.json`. Types and columns are those of :class:`experiments.trials.Row`, title, version, licence
-and citation those of `CITATION.cff`, sizes and sums those of the files; the same files give the same bytes.
+It is written as `reports/croissant.json` by :mod:`experiments.reporting.generated`. Types and columns are those of
+:class:`experiments.trials.Row`, title, version, licence and citation those of `CITATION.cff`, sizes and sums those of
+the files; the same files give the same bytes.
 
 References
 ----------
@@ -22,11 +21,9 @@ from typing import Any
 from omegaconf import OmegaConf
 
 from deskew.errors import InputError
-from deskew.io import write_bytes
 from experiments.trials import Row
 
 ROOT = Path(__file__).resolve().parents[2]
-FILE = "croissant.json"
 
 _TYPES = {"str": "sc:Text", "int": "sc:Integer", "float": "sc:Float"}
 _COLUMNS: Mapping[str, str] = {
@@ -141,12 +138,3 @@ def croissant_text(root: Path = ROOT) -> str:
     """Return the text of `reports/croissant.json` as it should be for what a checkout holds."""
     citation: Any = OmegaConf.to_container(OmegaConf.load(root / "CITATION.cff"))
     return json.dumps(croissant(root / "reports", citation), indent=1, ensure_ascii=False) + "\n"
-
-
-def main() -> None:
-    """Write `reports/croissant.json`."""
-    write_bytes(croissant_text().encode(), ROOT / "reports" / FILE)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,9 +1,9 @@
 """Every committed number that moves has its line in the changelog, with the digest of the table that holds it.
 
     python -m experiments.reporting.moved                     # names the tables without a line; exit code 1
-    python -m experiments.reporting.moved "why they moved"    # adds the lines to CHANGELOG.md
+    python -m experiments.reporting.moved "Why they moved"    # adds a line to CHANGELOG.md
 
-A line reads ``- `NAME` DIGEST: why`` and stands under the newest heading "### Numbers"; old ones stay, as history.
+A line reads ``- Why: `NAME` DIGEST, `NAME` DIGEST.`` and stands under the newest heading "### Numbers"; old ones stay.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 
 from deskew.errors import InputError, require
 from deskew.io import write_bytes
@@ -21,6 +22,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 _HEADING = "### Numbers\n"
 _DIGITS = 10
+_TABLE = re.compile(r"`([\w./]+)`\s+([0-9a-f]{10})\b")
+# A reason, then the tables.
+_LINE = re.compile(r"- [^`\s].*?:\s+`", re.DOTALL)
 
 
 def digests(reports: Path) -> dict[str, str]:
@@ -37,15 +41,16 @@ def digests(reports: Path) -> dict[str, str]:
 
 
 def without_line(changelog: str, tables: Mapping[str, str]) -> dict[str, str]:
-    """Return the tables, name and digest, that no line of the changelog speaks of."""
-    told = {
-        (name, digest) for name, digest in re.findall(r"^- `([\w./]+)` ([0-9a-f]{10}): \S", changelog, re.MULTILINE)
-    }
+    """Return the tables, name and digest, that no line of the changelog gives a reason for."""
+    told = set[tuple[str, str]]()
+    for item in re.split(r"^(?=- |#)", changelog, flags=re.MULTILINE):
+        if _LINE.match(item):
+            told.update(_TABLE.findall(item))
     return {name: digest for name, digest in tables.items() if (name, digest) not in told}
 
 
-def with_lines(changelog: str, tables: Mapping[str, str], why: str) -> str:
-    """Return the changelog with a line a table under its newest heading of numbers.
+def with_line(changelog: str, tables: Mapping[str, str], why: str) -> str:
+    """Return the changelog with a line for these tables under its newest heading of numbers.
 
     Raises
     ------
@@ -54,20 +59,21 @@ def with_lines(changelog: str, tables: Mapping[str, str], why: str) -> str:
     """
     require(why.strip() != "" and why.isprintable(), "why", "be a reason on one line", repr(why))
     require(_HEADING in changelog, "CHANGELOG.md", f"have the heading {_HEADING.strip()!r}", "none")
-    lines = "".join(f"- `{name}` {digest}: {why}\n" for name, digest in tables.items())
+    named = ", ".join(f"`{name}` {digest}" for name, digest in tables.items())
+    line = fill(f"- {why}: {named}.", 120, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     before, after = changelog.split(_HEADING, maxsplit=1)
-    return f"{before}{_HEADING}{lines}{after}"
+    return f"{before}{_HEADING}{line}\n{after}"
 
 
 def main(arguments: Sequence[str], root: Path = ROOT) -> int:
-    """Add the missing lines, or name their tables."""
+    """Add the missing line, or name its tables."""
     path = root / "CHANGELOG.md"
     changelog = path.read_text(encoding="utf-8")
     missing = without_line(changelog, digests(root / "reports"))
     try:
         require(len(arguments) <= 1, "arguments", "be one reason or none", len(arguments))
         if missing and arguments:
-            write_bytes(with_lines(changelog, missing, arguments[0]).encode(), path)
+            write_bytes(with_line(changelog, missing, arguments[0]).encode(), path)
     except InputError as error:
         print(error, file=sys.stderr)
         return error.exit_code

@@ -65,7 +65,7 @@ LINES: tuple[Line, ...] = (
     _line("corner_rigid_mean_mm", "corners, rigid mean [mm]", "shifted", "the page 1 mm aside: blind, as meant", _I),
     _line("dense_mean_mm", "all pixels, rigid mean [mm]", "stretched", _LONGER, _I),
     _line("dense_mean_mm", "all pixels, rigid mean [mm]", "another", _OTHER, _I),
-    _line("page_coverage", "share of the page shown", "another", _OTHER, _I, 4),
+    _line("page_coverage", "share of the page shown", "another", f"{_OTHER}: nearly blind", _I, 4),
     _line("depth_rms_mm", "filtered depth, RMS [mm]", "bed", "the empty bed's depth", _I),
     _line("depth_rms_mm", "filtered depth, RMS [mm]", "shifted", "the page 1 mm farther away", _I),
     Line(
