@@ -14,9 +14,14 @@ BIN := .venv/bin
 STAMP := .venv/.complete
 SOURCES := deskew data_synth experiments tests
 EXPERIMENTS := plane_accuracy corner_distance corner_distance_physical ocr_misses stiffness integrators
-EXPERIMENTS += surfaces surfaces_noisy real_boards
+EXPERIMENTS += surfaces surfaces_noisy real_boards settling culling attribution
 # Beyond the paper; they take as long again, so only the largest budget runs them.
-EXPERIMENTS += $(if $(filter full,$(BUDGET)),decoders textures ablations)
+EXPERIMENTS += $(if $(filter full,$(BUDGET)),decoders textures ablations sensitivity)
+
+# Physical crumples: at the paper's budget every one that is shipped, at the largest as many new ones as mirror folds.
+PHYSICAL_smoke := sheet=physical
+PHYSICAL_paper := sheet=physical trials=8
+PHYSICAL_full := sheet=physical sheet.drawn=true
 
 # What a run at this budget may overwrite: smoke proves that it runs and never touches the committed reports.
 REPORTS = $(if $(filter smoke,$(BUDGET)),out/smoke,reports)
@@ -32,6 +37,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@.ci/setup "$(PYTHON)"
 
 reproduce: $(EXPERIMENTS) ## run every experiment and regenerate reports/ (BUDGET=smoke|paper|full)
+	@$(BIN)/python -m experiments.reporting.claims $(REPORTS)
 	@$(if $(filter smoke,$(BUDGET)),true,$(BIN)/python -m experiments.reporting.readme)
 
 # One after another, whatever -j says: each uses all cores by itself.
@@ -41,7 +47,7 @@ $(EXPERIMENTS): $(STAMP)
 	@$(BIN)/python -m experiments experiment=$(patsubst %_physical,%,$(@:_noisy=)) budget=$(BUDGET) out=$(REPORTS)/$@ \
 		calibrations=out/calibrations \
 		$(if $(filter %_noisy,$@),surfaces.noise_mm=0.3) \
-		$(if $(filter %_physical,$@),sheet=physical $(if $(filter smoke,$(BUDGET)),,trials=8)) \
+		$(if $(filter %_physical,$@),$(PHYSICAL_$(BUDGET))) \
 		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)')) \
 		$(if $(filter ocr_misses,$@),$(if $(REAL_PAGES),ocr.real_path='$(REAL_PAGES)'))
 

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-
-from tqdm import tqdm
+from typing import Any
 
 from deskew.errors import InputError, StepError
+from experiments.progress import Progress
 from experiments.reporting.export import Results, require_targets, write_report
 from experiments.reporting.provenance import provenance
 from experiments.settings import Config
 from experiments.studies import Study, find_study
-from experiments.trials import Engine, Outcome, Processes, Row, Serial, Store, TrialKey, fingerprint, settings_of
-from experiments.trials.engines import one_thread
+from experiments.trials import Engine, Outcome, Row, Store, TrialKey, chosen_engine, fingerprint, settings_of
+from experiments.trials.threads import one_thread
 
 _REPORTS = Path(__file__).resolve().parents[1] / "reports"
 
@@ -45,7 +45,7 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
     Raises
     ------
     InputError, StepError
-        If a setting is wrong, the shared work fails, or not one trial succeeds.
+        If a setting is wrong, the engine cannot be had, the shared work fails, or not one trial succeeds.
     AbsentError
         If the study's data is not here.
     """
@@ -57,12 +57,14 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
     about = study.about(config)
     settings = settings_of(config, study.inputs(config))
     identity = fingerprint({**settings, **about})
+    engine = chosen_engine(config.engine, out, identity)
     with Store(out, identity) as store:
         store.forget_lost()
         finished = store.finished()
         missing = [key for key in keys if key not in finished]
         if missing:
-            _run_missing(study, config, missing, store)
+            progress = Progress(config.experiment, len(keys) - len(missing), len(keys))
+            _run(study, config, missing, engine, store, progress)
         prepared = _prepare_key(config)
         results = Results(
             store.rows(keys), store.rows([*keys, prepared], "timing"), store.failures(keys), store.pictures(keys)
@@ -73,17 +75,26 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
     return Finished(out, len(keys), len(missing), len({(f.trial, f.condition, f.method) for f in results.failures}))
 
 
-def _run_missing(study: Study, config: Config, missing: Sequence[TrialKey], store: Store) -> None:
-    start = time.perf_counter()
-    with one_thread():
-        shared = study.prepare(config)
-    seconds = time.perf_counter() - start
-    key = _prepare_key(config)
-    store.record(key, Outcome((), (Row.of(key, key.condition, key.method, "seconds_prepare", seconds),)))
-    engine: Engine = Serial() if config.engine.name == "serial" else Processes(config.engine.workers)
-    finished = engine.run(partial(study.run, config, shared), missing)
-    for done, outcome in tqdm(finished, config.experiment, len(missing), unit="trial", file=sys.stderr, disable=None):
-        store.record(done, outcome)
+def _run(
+    study: Study, config: Config, missing: Sequence[TrialKey], engine: Engine, store: Store, progress: Progress
+) -> None:
+    """Have an engine carry out the missing trials, and keep each as soon as it is there."""
+
+    def prepare() -> Any:
+        start = time.perf_counter()
+        with one_thread():
+            shared = study.prepare(config)
+        key = _prepare_key(config)
+        row = Row.of(key, key.condition, key.method, "seconds_prepare", time.perf_counter() - start)
+        store.record(key, Outcome((), (row,)))
+        progress.start()
+        return shared
+
+    # Closed at once, whatever happens: an engine ends its workers then.
+    with closing(engine.run(missing, partial(study.run, config), prepare)) as outcomes, progress:
+        for key, outcome in outcomes:
+            store.record(key, outcome)
+            progress.add(outcome)
 
 
 def _prepare_key(config: Config) -> TrialKey:

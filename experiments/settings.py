@@ -16,6 +16,7 @@ from omegaconf import MISSING
 from deskew.errors import InputError, require
 
 BUDGETS = ("smoke", "paper", "full")
+ENGINES = ("processes", "ray", "serial", "slurm")
 SURFACE_KINDS = ("cylinder", "cone", "folds", "mirror", "physical")
 
 
@@ -162,16 +163,38 @@ class AblationSettings(Checked):
     ambient: list[float] = values_of("ambient", [0.1, 0.3])
 
 
+def _address(value: str | None) -> bool:
+    host, _, port = (value or "").rpartition(":")
+    return value is None or (bool(host) and "/" not in host and port.isdecimal() and int(port) < 65536)
+
+
 @dataclass
 class EngineSettings(Checked):
-    """What carries the trials out."""
+    """What carries the trials out.
+
+    `workers`: trials at once; of SLURM, jobs among which the trials are divided.
+    `address`: of a Ray cluster that runs.
+    `cluster`: where submitit runs its jobs, `local` for processes of this machine.
+    `partition`: of SLURM, null for its own choice.
+    `minutes`: after which SLURM may end a job; its longest trial must fit.
+    `folder`: for the jobs' files, on a disk that all nodes share; null for `out`.
+    """
 
     group: ClassVar[str] = "engine."
-    name: str = choice("processes", "serial", "processes")
+    name: str = choice("processes", *ENGINES)
     workers: int | None = setting(
         None,
         "be a whole number in [1, 256], or null for one a core",
         lambda value: value is None or 1 <= value <= 256,
+    )
+    address: str | None = setting(None, "be HOST:PORT of a Ray cluster, or null to start one here", _address)
+    cluster: str = choice("slurm", "slurm", "local")
+    partition: str | None = setting(
+        None, "be a name, or null", lambda value: value is None or bool(value.strip() and value.isprintable())
+    )
+    minutes: int = count(60, 1, 100_000)
+    folder: str | None = setting(
+        None, "be the name of a folder, or null", lambda value: value is None or bool(value and value.isprintable())
     )
 
 
@@ -311,7 +334,7 @@ class SensitivitySettings(Checked):
 
     group: ClassVar[str] = "sensitivity."
     slope_p90_deg: list[float] = several([10.0, 15.0, 25.0, 30.0], 1.0, 45.0, "degrees")
-    noise_scale: list[float] = several([0.5, 2.0, 4.0], 0.0, 10.0, "times the rig's own noise")
+    noise_scale: list[float] = several([0.5, 2.0, 3.0, 4.0], 0.0, 10.0, "times the rig's own noise")
     mesh: list[int] = several([12, 23, 90, 180], 4, 400)
     projector_yaw_deg: list[float] = several([0.02, 0.05, 0.1], -1.0, 1.0, "degrees")
     baseline_percent: list[float] = several([0.25, 0.5, 1.0], -5.0, 5.0, "%")

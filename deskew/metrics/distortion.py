@@ -24,7 +24,7 @@ moving: bare paper takes the flow of the ink round it, which is where it goes on
 the whole, if there is one, lest a page that lies a line's distance off be matched line by wrong line.
 
 On a full page waves of 16 pixels are read right within 3 %; from 40 on one line of text is taken for the next, and LD
-is a tenth too small. On sparse pages bare paper decides, and LD may be a quarter off; AD asks for edges alone.
+is a sixth too small. On sparse pages bare paper decides, and LD may be half off; AD asks for edges alone.
 
 References
 ----------

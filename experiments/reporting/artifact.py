@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from experiments.reporting.agreement import tolerance_of
 from experiments.reporting.claims.measures import Evidence, MissingError
@@ -88,6 +90,7 @@ def _figure(expected: Expectation, evidence: Evidence) -> list[str]:
         return [expected.claim, *where, "no report", "0", NONE, NONE]
     unit = unit_of(values.metric)
     allowed, ends = tolerance_of(values.metric, unit), rerun_interval(found)
+    same = _same_pages(evidence.run(values.report))
     shown = "" if unit == _UNITLESS else f" {unit}"
     return [
         expected.claim,
@@ -95,5 +98,14 @@ def _figure(expected: Expectation, evidence: Evidence) -> list[str]:
         f"{sum(found) / len(found):.{digits}f}{shown}",
         str(len(found)),
         NONE if allowed is None else f"± {allowed:g}",
-        expected.same or (NONE if ends is None else f"{ends[0]:.{digits}f}..{ends[1]:.{digits}f}"),
+        f"{same}: as expected" if same else (NONE if ends is None else f"{ends[0]:.{digits}f}..{ends[1]:.{digits}f}"),
     ]
+
+
+def _same_pages(run: Mapping[str, Any]) -> str:
+    """Return what another seed leaves as it is, where it draws no other pages; "" where it does."""
+    experiment, sheet = run["experiment"], run["config"].get("sheet", {})
+    if experiment == "real_boards":
+        return "real pictures"
+    shipped = experiment == "stiffness" or sheet.get("kind") == "physical"
+    return "shipped sheets" if shipped and not sheet.get("drawn") else ""

@@ -7,10 +7,11 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from io import StringIO
+from importlib.util import find_spec
+from io import BytesIO, StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, get_type_hints
 
 from deskew.errors import StepError, require
 from experiments.reporting.curves import curve_plot
@@ -21,6 +22,8 @@ from experiments.reporting.ladders import ladder_plot
 from experiments.reporting.layout import Layout
 from experiments.reporting.tables import table, times_page
 from experiments.trials.schema import Failure, Row
+
+_PARQUET = "results.parquet"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,9 @@ class Results:
 def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str, Any]) -> None:
     """Write `results.csv`, `timings.csv`, `table.md`, `figures/*.png`, `run.json` and any `profile.md` under `out`.
 
-    Everything is made before the first file is replaced, so what fails leaves the old report standing.
+    `results.parquet`, the same rows with types, is written where pyarrow is installed; elsewhere an old one goes, for
+    its rows would not be those of `results.csv`. Everything is made before the first file is replaced, so what fails
+    leaves the old report standing.
     """
     run = dict(about) | {"failures": [asdict(failure) for failure in results.failures]}
     files: dict[str, bytes] = {
@@ -45,6 +50,8 @@ def write_report(out: Path, layout: Layout, results: Results, about: Mapping[str
         "table.md": table(layout, results.rows, results.failures, results.timings).encode(),
         "run.json": (json.dumps(run, indent=2, sort_keys=True) + "\n").encode(),
     }
+    if find_spec("pyarrow") is not None:
+        files[_PARQUET] = parquet_bytes(results.rows)
     if layout.profile is not None:
         files["profile.md"] = times_page(layout.profile, results.timings).encode()
     files |= {f"figures/{name}.png": png for name, png in _figures(layout, results).items()}
@@ -87,6 +94,7 @@ def require_targets(out: Path, layout: Layout) -> None:
     drawn = [item.name for kind in figures for item in kind]
     names = [
         "results.csv",
+        _PARQUET,
         "timings.csv",
         "table.md",
         "profile.md",
@@ -116,6 +124,8 @@ def _replace_all(out: Path, files: Mapping[str, bytes]) -> None:
                 (Path(scratch) / name).write_bytes(content)
             for name in files:
                 (Path(scratch) / name).replace(out / name)
+            if _PARQUET not in files:
+                (out / _PARQUET).unlink(missing_ok=True)
     except OSError as error:
         reason = f"{error.strerror or error}; choose a writable folder with room, finished trials are kept"
         raise StepError(f"Writing the report under `{out}` failed: {reason}.") from error
@@ -127,4 +137,23 @@ def csv_text(rows: Sequence[Row]) -> str:
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([item.name for item in fields(Row)])
     writer.writerows(row.cells() for row in sorted(rows))
+    return buffer.getvalue()
+
+
+def parquet_bytes(rows: Sequence[Row]) -> bytes:
+    """Return rows as Parquet, sorted and with the columns of the CSV; `trial` and `seed` int64, `value` a double.
+
+    The same rows give the same bytes by the same pyarrow, which must be installed.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    types = {int: pa.int64(), float: pa.float64(), str: pa.string()}
+    ordered = sorted(rows)
+    columns = {
+        name: pa.array([getattr(row, name) for row in ordered], types[kind])
+        for name, kind in get_type_hints(Row).items()
+    }
+    buffer = BytesIO()
+    parquet.write_table(pa.table(columns), buffer, compression="zstd")
     return buffer.getvalue()

@@ -33,7 +33,8 @@ def tails_table(tails: Tails, columns: Sequence[Column], places: Mapping[Place, 
             ones = pages.of(tails.share)
             if not named_by(wanted, condition) or not (ones or pages.failed):
                 continue
-            kept = share(int(sum(ones)), len(ones) + len(pages.failed))
+            # Where every page failed there is no share: the summary counts them.
+            kept = share(int(sum(ones)), len(ones) + len(pages.failed)) if ones else NONE
             for column in (by_metric[metric] for metric in tails.metrics):
                 cells = _quantiles(pages.of(column.metric), column.digits)
                 lines.append([condition, method, column.heading, kept, *cells])

@@ -64,18 +64,20 @@ def paired(one: PlacePages, other: PlacePages, metric: str) -> Paired:
 
 def method_against_method(versus: Versus, columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> str | None:
     """Return a table with a line a condition, method and metric; None if no two methods can be compared."""
+    asked = [column for column in columns if column.metric in versus.metrics]
     lines = []
     for wanted in versus.conditions:
         for (condition, method), one in places.items():
             other = places.get((condition, versus.baseline))
             if other is None or method in ("-", versus.baseline) or not named_by(wanted, condition):
                 continue
-            for column in (column for column in columns if column.metric in versus.metrics):
-                if column.metric in {**one.values, **other.values}:
-                    pair = paired(one, other, column.metric)
-                    equal = str(pair.found.n_equal) if pair.found is not None else NONE
-                    cells = [*pair.counts(), pair.difference(column.digits), *pair.verdict(), equal]
-                    lines.append([condition, method, column.heading, *cells])
+            # Where both lost every page, a line still says so.
+            measured = [column for column in asked if column.metric in {**one.values, **other.values}] or asked[:1]
+            for column in measured:
+                pair = paired(one, other, column.metric)
+                equal = str(pair.found.n_equal) if pair.found is not None else NONE
+                cells = [*pair.counts(), pair.difference(column.digits), *pair.verdict(), equal]
+                lines.append([condition, method, column.heading, *cells])
     headings = ["condition", "method", "figure", "pages", "failed (against)", "difference", "ratio of means"]
     return markdown_table([*headings, "better on", "equal on"], lines) if lines else None
 

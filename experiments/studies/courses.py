@@ -19,6 +19,7 @@ RESIDUAL = 1e-2
 _STRIDE, _FLAT_MM = 20, 0.05
 _COUNTERS = ("steps", "steps_rejected", "force_evaluations", "contacts", "folded_quads")
 _SHORTEST, _STEEPEST = 15.0, 40.0
+_GOLDEN = (5**0.5 - 1) / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +75,12 @@ def rigid_mean(places: Floats, others: Floats) -> float:
     return float(np.linalg.norm(metrics.fit_rigid(a, b).apply(a) - b, axis=1).mean())
 
 
-def mapped_slope(trial: int, n_trials: int) -> float:
-    """Severity of a sheet in the map of outcomes: evenly from gentle to steep [deg]."""
-    return _SHORTEST + (_STEEPEST - _SHORTEST) * (trial + 0.5) / n_trials
+def spread_slope(trial: int) -> float:
+    """Severity of a sheet of a trial [deg], spread from gentle to steep however many trials there are.
+
+    Multiples of the golden ratio fill an interval evenly (Weyl), so that a run which grows keeps its first sheets.
+    """
+    return _SHORTEST + (_STEEPEST - _SHORTEST) * ((trial + 0.5) * _GOLDEN % 1.0)
 
 
 def measure_flattening(record: Recorder, condition: str, page: Page, method: str, **settings: object) -> None:

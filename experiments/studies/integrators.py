@@ -13,7 +13,8 @@ from experiments.studies.study import Study
 from experiments.trials import Outcome, Recorder, TrialKey
 
 # Of the sheets in the map of outcomes so many are also timed, thrown and let bounce.
-_N_FLOWN, _N_FLATTENED = 3, 5
+_N_FLOWN = 3
+_N_FLATTENED = {"smoke": 5, "paper": 5, "full": 20}
 _DEFAULT_DAMPING = 0.8
 _EQUAL = (("free_flight/dt=", ""),)
 _FLOWN = (*_EQUAL, ("free_flight/tolerance=", ", its own steps"))
@@ -216,14 +217,15 @@ class Integrators(Study):
             flattening.find_integrator(name)
         require(not config.sheet.paths, "sheet.paths", "be left out of this experiment", config.sheet.paths)
         own = config.integrators
+        n_flattened = _N_FLATTENED[config.budget.name]
         damped = [f"stability/zeta={ratio:g}" for ratio in own.damping_ratios]
         parts = {
             "free_flight": min(config.trials, _N_FLOWN),
             "contact/bounce": 1,
             "energy": min(config.trials, _N_FLOWN),
             **dict.fromkeys([*damped, *(f"stability/ks={k_s:g}" for k_s in own.stiffness)], 1),
-            "flattening": min(config.trials, _N_FLATTENED),
-            "contact/ks": min(config.trials, _N_FLATTENED),
+            "flattening": min(config.trials, n_flattened),
+            "contact/ks": min(config.trials, n_flattened),
             "outcomes": config.trials,
         }
         return [
@@ -246,7 +248,7 @@ class Integrators(Study):
             damping, k_s = (float(value), 1.0) if part.endswith("zeta") else (_DEFAULT_DAMPING, float(value))
             integrator_tests.measure_stable_step(record, key.condition, rng, config.methods, damping, k_s)
         elif part == "outcomes":
-            slope = courses.mapped_slope(key.trial, config.trials)
+            slope = courses.spread_slope(key.trial)
             page = courses.crumpled_page(rng, (config.mesh.rows, config.mesh.columns), slope)
             courses.map_outcomes(record, page, own.pushes, own.mapped)
         else:

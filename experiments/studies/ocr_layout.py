@@ -16,7 +16,6 @@ _IMAGE = (
     "line_straightness_px",
     "line_spread_deg",
     "text_lines",
-    "error_rate_percent",
 )
 _WAYS = {"_normalised": "normalised", "_projector": "projector light", "_unshaded": "shading removed"}
 
@@ -78,8 +77,9 @@ LAYOUT = Layout(
             "Misses",
             "How bent the sheets are was chosen once on unrestored pages and frozen (docs/adr/0019). `spring` is the "
             "best method, `paper_*` the paper's as a whole, its scan included; `ideal` is the page warped back by its "
-            "true shape: what it misses is light read as marks, which no restoration that keeps the light can help.",
-            _MAIN,
+            "true shape: what it misses is light read as marks, which no restoration that keeps the light can help. "
+            "`null/shuffled` is the true letters in random order: what a reading scores that has nothing but them.",
+            (*_MAIN, "null/shuffled"),
             (
                 "misses",
                 *_PARTS,
@@ -110,9 +110,10 @@ LAYOUT = Layout(
             "Image metrics",
             "What the document-unwarping field reports, from pictures alone, against the control (docs/adr/0026). LD, "
             "AD and Li-D are by DIS flow, not by the field's SIFT flow, and in pixels of pictures of 149,600 pixels. "
-            "`null/shifted` is the control itself moved by one pixel, `null/shuffled` its letters in random order: "
-            "what a metric reads of a truth that is spoilt.",
-            ("control", "null/", "unrestored", "ideal", "restored"),
+            "MS-SSIM and LD count where the page lies in the picture, which no method is asked to know; AD, Li-D and "
+            "the lines count its shape. `null/shifted` is the control itself moved by one pixel: what a metric reads "
+            "of a truth that is spoilt.",
+            ("control", "null/shifted", "unrestored", "ideal", "restored"),
             _IMAGE,
         ),
         Section(

@@ -51,8 +51,8 @@ class Settling(Study):
     def run(self, config: Config, shared: Any, key: TrialKey) -> Outcome:
         """Flatten one page under every setting."""
         record, rng = Recorder(key), key.generator()
-        slope = courses.mapped_slope(key.trial, config.trials)
-        page = courses.crumpled_page(rng, (config.mesh.rows, config.mesh.columns), slope)
+        shape = config.mesh.rows, config.mesh.columns
+        page = courses.crumpled_page(rng, shape, courses.spread_slope(key.trial))
         chords = courses.rigid_mean(page.rest, page.flat)
         about = {"slope_p90_deg": page.slope_p90_deg, "relief_mm": page.relief_mm, "discretisation_mm": chords}
         record.add("page", "-", about)

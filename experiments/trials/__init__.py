@@ -1,6 +1,6 @@
 """Trials: what a row is, which trials a run plans, who carries them out and where finished ones are kept."""
 
-from experiments.trials.engines import Engine, Processes, Serial
+from experiments.trials.engines import Engine, Processes, Serial, chosen_engine
 from experiments.trials.plan import content_digest, fingerprint, settings_of, trial_keys
 from experiments.trials.record import Outcome, Recorder, reason_of
 from experiments.trials.schema import Failure, Row, TrialKey, unit_of
@@ -16,6 +16,7 @@ __all__ = [
     "Serial",
     "Store",
     "TrialKey",
+    "chosen_engine",
     "content_digest",
     "fingerprint",
     "reason_of",

@@ -26,12 +26,12 @@ _SECTIONS = {
     "settling": "settling",
     "culling": "culling",
 }
-# Sources that rows come from; reporting and the program around it change no row.
+# Sources that rows come from; reporting, the program around it and who carries trials out change no row.
 SOURCES = (
     "deskew",
     "data_synth",
     "experiments/studies",
-    *(f"experiments/trials/{name}.py" for name in ("engines", "record", "schema")),
+    *(f"experiments/trials/{name}.py" for name in ("record", "schema", "threads")),
     "requirements.lock",
 )
 _ROOT = Path(__file__).resolve().parents[2]

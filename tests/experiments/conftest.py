@@ -9,6 +9,7 @@ from hydra.core.config_store import ConfigStore
 from experiments.program import main
 from experiments.studies import STUDIES
 from experiments.trials import plan
+from tests.experiments.driven import Run
 
 SOURCES = ("tests/experiments/fake_study.py",)
 
@@ -50,3 +51,11 @@ def register_fake() -> None:
     STUDIES["fake"] = "tests.experiments.fake_study:FakeStudy"
     node = {"experiment": "fake", "trials_at": {"smoke": 2, "paper": 4, "full": 6}}
     ConfigStore.instance().store("fake", node, group="experiment", package="_global_")
+
+
+@pytest.fixture(scope="session")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """`results.csv` of 200 slow trials that nobody kills."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    Run.start(folder / "out", folder / "log", "engine=serial").end()
+    return (folder / "out" / "results.csv").read_bytes()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,8 @@ from experiments.studies import AbsentError, Study
 from experiments.trials import Outcome, Recorder, TrialKey
 
 # The sheet's slope is the one number that the tests can set freely: these values ask for trouble.
-ABSENT, STEP_FAILS, TRIAL_1_FAILS, ALL_FAIL, TRIAL_1_KILLS, NAN, KILLED_ONCE = 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0
+ABSENT, STEP_FAILS, TRIAL_1_FAILS, ALL_FAIL, TRIAL_1_KILLS, NAN, KILLED_ONCE, SLOW = map(float, range(1, 9))
+SLOW_SECONDS = 0.02
 
 
 class FakeStudy(Study):
@@ -49,6 +51,8 @@ class FakeStudy(Study):
         if slope == KILLED_ONCE and key.trial == 1 and not Path("killed").exists():
             Path("killed").touch()
             os.kill(os.getpid(), signal.SIGKILL)
+        if slope == SLOW:
+            time.sleep(SLOW_SECONDS)
         record = Recorder(key)
         rng = key.generator()
         with record.stage("render"):

@@ -62,6 +62,8 @@ def test_a_method_that_always_failed_is_shown_as_such() -> None:
     layout = Layout("T", "N", (ERROR,), versus=Versus("", "theirs", ("restored",), ("corner_mean_px",)))
     rows = [*rows_of("restored", "theirs", {0: 1.0, 1: 2.0}), *failed("restored", "ours", 0, 1)]
     assert "| restored | ours | mean [px] | 0 | 2 (0) | – | – | – | – |" in table(layout, rows, [])
+    none = [*failed("restored", "theirs", 0), *failed("restored", "ours", 0, 1)]
+    assert "| restored | ours | mean [px] | 0 | 2 (1) | – | – | – | – |" in table(layout, none, [])
 
 
 def test_condition_against_condition_keeps_to_the_method() -> None:

@@ -9,6 +9,7 @@ import pickle
 import runpy
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
@@ -18,6 +19,7 @@ import pytest
 
 from experiments.complaints import refuse_arguments
 from experiments.program import main
+from experiments.reporting import export
 from experiments.studies import STUDIES
 from tests.experiments.conftest import Program
 from tests.experiments.fake_study import ABSENT, ALL_FAIL, NAN, STEP_FAILS, TRIAL_1_FAILS, FakeStudy
@@ -51,7 +53,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("rig.ambient=-0.1", ("`rig.ambient`", "[0, 1]", "-0.1")),
         ("scan.ink=some", ("`scan.ink`", "true, false or null", "got some")),
         ("mesh.rows=1", ("`mesh.rows`", "[2, 1000]", "1")),
-        ("colour=red", ("`colour`", "one of ablations, budget, decoders, engine, experiment")),
+        ("colour=red", ("`colour`", "one of ablations, budget, calibrations, culling, decoders, engine, experiment")),
         ("+x=1", ("`x`", "existing key", "+x=1")),
         ("++seed=3", ("`seed`", "++seed=3")),
         ("~seed", ("`seed`", "~seed")),
@@ -59,9 +61,14 @@ ROOT = Path(__file__).resolve().parents[2]
         ("method=[a,a]", ("`method`", "different", "['a', 'a']")),
         ("method=[]", ("`method`", "[]")),
         ("budget=huge", ("`budget`", "full, paper, smoke", "'huge'")),
-        ("engine=ray", ("`engine`", "processes, serial", "'ray'")),
-        ("engine=slurm", ("`engine`", "processes, serial", "'slurm'")),
+        ("engine=dask", ("`engine`", "processes, ray, serial, slurm", "'dask'")),
         ("engine.workers=0", ("`engine.workers`", "[1, 256]", "0")),
+        ("engine.address=head", ("`engine.address`", "HOST:PORT of a Ray cluster", "'head'")),
+        ("engine.address='ray://head:10001'", ("`engine.address`", "HOST:PORT of a Ray cluster", "ray://head:10001")),
+        ("engine.cluster=lsf", ("`engine.cluster`", "slurm, local", "'lsf'")),
+        ("engine.partition=' '", ("`engine.partition`", "be a name, or null", "' '")),
+        ("engine.minutes=0", ("`engine.minutes`", "[1, 100000]", "0")),
+        ("engine.folder=''", ("`engine.folder`", "name of a folder", "''")),
         (
             "experiment=colours",
             ("`experiment`", ", ".join(sorted([*STUDIES, "fake"])), "'colours'"),
@@ -71,10 +78,10 @@ ROOT = Path(__file__).resolve().parents[2]
         ("--nonsense", ("--nonsense", "KEY=VALUE")),
         ("out=/dev/null/x", ("`out`", "/dev/null/x")),
         (f"out=new/{'y' * 300}", ("`out`", "yyy", "too long")),
-        ("experiment=null", ("`experiment`", "ablations, attribution, corner_distance", "got null")),
+        ("experiment=null", ("`experiment`", "ablations, attribution, corner_distance, culling", "got null")),
         ("experiment=1", ("`experiment`", "got 1")),
         ("experiment=[fake,fake]", ("`experiment`", "got [fake,fake]")),
-        ("engine=null", ("`engine`", "processes, serial", "got null")),
+        ("engine=null", ("`engine`", "processes, ray, serial, slurm", "got null")),
         ("sheet=[]", ("`sheet`", "mirror", "got []")),
         ("budget=[smoke,paper]", ("`budget`", "full, paper, smoke", "got [smoke,paper]")),
         ("hydra=null", ("Hydra", "NoneType")),
@@ -89,7 +96,7 @@ ROOT = Path(__file__).resolve().parents[2]
         ("mesh=null", ("`mesh`", "columns, rows", "got null.")),
         ("method={a:1}", ("`method`", "list of different names, got {a:1}.")),
         ("sheet.paths=x.npz", ("`sheet.paths`", "list of NPZ files, one a trial, got x.npz.")),
-        (f"engine.name={'x' * 5000}", ("`engine.name`", "serial, processes", "x ... x")),
+        (f"engine.name={'x' * 5000}", ("`engine.name`", "processes, ray, serial, slurm", "x ... x")),
     ],
 )
 def test_wrong_input_is_one_line_and_code_2(
@@ -113,7 +120,7 @@ def test_wrong_input_is_one_line_and_code_2(
         (["seed=range(0,3,0)"], ("`seed`", "values to sweep over", "range(0,3,0)", "zero")),
         (["seed=range(3,3)"], ("`seed`", "values to sweep over", "range(3,3)")),
         (["seed=glob(*)"], ("`seed`", "values to sweep over", "glob(*)")),
-        (["engine=glob(ray*)"], ("`engine`", "match one of processes, serial", "glob(ray*)")),
+        (["engine=glob(dask*)"], ("`engine`", "match one of processes, ray, serial, slurm", "glob(dask*)")),
         (["out=log", "seed=1,2"], ("`log`", "path", "exists")),
         (["--run"], ("Only one of --run, --multirun",)),
     ],
@@ -237,8 +244,18 @@ def test_a_run_leaves_its_contracted_files_and_no_others(program: Program, out: 
     found = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
     pages = {f"figures/page_{trial}.png" for trial in range(4)}
     files = {"results.sqlite", "results.csv", "timings.csv", "table.md", "run.json", "figures/corners.png"}
-    assert found == files | pages
+    assert found == files | pages | ({"results.parquet"} if find_spec("pyarrow") else set())
     assert {path.name for path in out.parent.iterdir()} == {"log", "out"}
+
+
+def test_without_pyarrow_no_parquet_of_other_rows_is_left(
+    program: Program, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out.mkdir()
+    (out / "results.parquet").write_bytes(b"of an earlier run")
+    monkeypatch.setattr(export, "find_spec", lambda name: None)
+    assert program("trials=1") == 0
+    assert not (out / "results.parquet").exists()
 
 
 def test_results_are_tidy_sorted_and_hold_no_times(program: Program, out: Path) -> None:

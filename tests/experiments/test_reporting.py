@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 from deskew.errors import InputError
 from experiments.reporting import Column, Layout, Montage, Plot
-from experiments.reporting.export import csv_text
+from experiments.reporting.export import csv_text, parquet_bytes
 from experiments.reporting.figures import dot_plot, picture_wall, png_bytes
 from experiments.reporting.tables import table
 from experiments.trials import Failure, Outcome, Recorder, Row, TrialKey, unit_of
@@ -30,6 +32,19 @@ def test_a_value_in_the_csv_reads_back_as_the_same_double(value: float) -> None:
 def test_csv_does_not_depend_on_the_order_of_its_rows() -> None:
     rows = rows_of([0.3, 0.1, 0.2]) + rows_of([1.0], "control")
     assert csv_text(rows) == csv_text(rows[::-1])
+
+
+def test_parquet_holds_the_rows_of_the_csv_with_types_and_repeats_its_bytes() -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    rows = rows_of([0.3, 0.1, 1 / 3]) + rows_of([1.0], "control")
+    written = parquet_bytes(rows)
+    assert parquet_bytes(rows[::-1]) == written
+    read = parquet.read_table(BytesIO(written))
+    assert [str(kind) for kind in read.schema.types] == [
+        *("string", "string", "string", "int64", "int64", "string", "double", "string")
+    ]
+    assert [Row(**row) for row in read.to_pylist()] == sorted(rows)
+    assert read.column_names == csv_text([]).strip().split(",")
 
 
 @pytest.mark.parametrize(

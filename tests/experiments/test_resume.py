@@ -5,9 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sqlite3
-import subprocess
-import sys
-import time
 from functools import partial
 from pathlib import Path
 
@@ -15,11 +12,9 @@ import pytest
 
 from experiments.settings import Config
 from experiments.trials import TrialKey
-from experiments.trials.engines import _answer, _Worker
+from experiments.trials.engines.processes import _answer, _Worker
 from tests.experiments.conftest import Program
 from tests.experiments.fake_study import KILLED_ONCE, TRIAL_1_KILLS, FakeStudy
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def lines_of(log: Path) -> list[str]:
@@ -102,10 +97,11 @@ def test_killed_worker_costs_one_trial_which_the_next_run_tries_again(program: P
 
 def test_ctrl_c_reaches_no_worker_even_while_it_imports() -> None:
     config = Config(experiment="fake", trials=1, method="a")
-    worker = _Worker.start(partial(FakeStudy().run, config, 0.25))
+    worker = _Worker.start(partial(FakeStudy().run, config))
     try:
         # It takes a second to import: this comes first.
         os.kill(worker.process.pid or 0, signal.SIGINT)
+        worker.share(0.25)
         worker.take(TrialKey("fake"))
         _, outcome = _answer(worker)
     finally:
@@ -124,48 +120,6 @@ def test_worker_killed_from_outside_loses_no_row(program: Program, out: Path, lo
     (out / "results.sqlite").unlink()
     assert program(trouble) == 0
     assert (out / "results.csv").read_bytes() == survived
-
-
-DRIVER = """
-import sys, time
-from tests.experiments import conftest, fake_study
-from experiments.program import main
-from experiments.trials import plan
-if __name__ == "__main__":
-    conftest.register_fake()
-    plan.SOURCES = conftest.SOURCES
-    slow = fake_study.FakeStudy.run
-    def run(self, config, shared, key):
-        if key.trial == 2:
-            time.sleep(60)
-        return slow(self, config, shared, key)
-    fake_study.FakeStudy.run = run
-    sys.exit(main(sys.argv[1:]))
-"""
-
-
-def test_killed_driver_keeps_its_finished_trials(program: Program, out: Path, log: Path) -> None:
-    command = [sys.executable, "-c", DRIVER, "experiment=fake", f"out={out}", "engine=serial"]
-    driver = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
-    try:
-        deadline = time.monotonic() + 60.0
-        while "trial 1" not in lines_of(log):
-            assert driver.poll() is None
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
-        # The driver notes a trial in the log just before it stores it.
-        time.sleep(0.3)
-    finally:
-        os.killpg(driver.pid, signal.SIGKILL)
-        driver.wait()
-    assert not (out / "results.csv").exists()
-    log.write_text("")
-    assert program() == 0
-    assert lines_of(log) == ["prepare", "trial 2", "trial 3"]
-    resumed = (out / "results.csv").read_bytes()
-    (out / "results.sqlite").unlink()
-    assert program() == 0
-    assert (out / "results.csv").read_bytes() == resumed
 
 
 def test_two_runs_cannot_share_a_folder(program: Program, out: Path, capsys: pytest.CaptureFixture[str]) -> None:

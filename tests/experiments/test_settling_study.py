@@ -11,6 +11,7 @@ import pytest
 
 from deskew.types import Flattened, Status
 from experiments.program import main
+from experiments.studies.courses import spread_slope
 from experiments.studies.endings import ENDS, STOPS, ending, energy_stop
 
 TINY = [
@@ -75,6 +76,14 @@ def test_energy_alone_stops_at_the_first_look_that_saw_no_change(
     stop = energy_stop(run(Status.LOCKED, folded=folded, heights=heights, energies=energies), 2.0)
     assert (stop.kind, stop.energy_ratio) == (kind, ratio)
     assert stop.kind in STOPS
+
+
+@pytest.mark.parametrize("n", [5, 10, 50])
+def test_slopes_are_spread_evenly_however_many_there_are(n: int) -> None:
+    slopes = np.sort([spread_slope(trial) for trial in range(n)])
+    assert 15.0 < slopes[0] < slopes[-1] < 40.0
+    gaps = np.diff(np.concatenate([[15.0], slopes, [40.0]]))
+    assert gaps.max() < 2.0 * 25.0 / (n + 1)
 
 
 @pytest.fixture(scope="module")

@@ -90,7 +90,18 @@ def test_real_boards_refuse_other_captures(tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.parametrize(
-    "name", ["ablations", "attribution", "corner_distance", "plane_accuracy", "real_boards", "sensitivity", "speed"]
+    "name",
+    [
+        "ablations",
+        "attribution",
+        "corner_distance",
+        "culling",
+        "plane_accuracy",
+        "real_boards",
+        "sensitivity",
+        "settling",
+        "speed",
+    ],
 )
 def test_every_study_documents_its_conditions(name: str) -> None:
     study = find_study(name)

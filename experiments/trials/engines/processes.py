@@ -1,7 +1,4 @@
-"""Who carries trials out: one after another here, or in a pool of worker processes.
-
-An engine runs each trial at least once and yields it; the store makes that exactly once. It never raises for a trial.
-"""
+"""A pool of worker processes on this machine."""
 
 from __future__ import annotations
 
@@ -10,57 +7,19 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Protocol
+from typing import Any
 
-import cv2
-from threadpoolctl import threadpool_limits
-
+from experiments.trials.engines.engine import WORKERS_A_TRIAL, Finished, Prepare, Run
 from experiments.trials.record import Outcome, carry_out, failed_outcome
 from experiments.trials.schema import TrialKey
-
-Run = Callable[[TrialKey], Outcome]
-
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-# A death may have come from outside, so a trial gets a second worker before it is given up.
-_WORKERS_A_TRIAL = 2
-
-
-class Engine(Protocol):
-    """Carries trials out, in any order."""
-
-    def run(self, run: Run, keys: Sequence[TrialKey]) -> Iterator[tuple[TrialKey, Outcome]]:
-        """Yield every key with its outcome as soon as it is there; `run` must be picklable for engines with workers."""
-        ...
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Hold linear algebra and OpenCV to one thread: sums are then taken in one order and bytes repeat."""
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        with threadpool_limits(limits=1):
-            yield
-    finally:
-        cv2.setNumThreads(before)
-
-
-@dataclass(frozen=True, slots=True)
-class Serial:
-    """One trial after another in this process: for debugging, and the reference of every other engine."""
-
-    def run(self, run: Run, keys: Sequence[TrialKey]) -> Iterator[tuple[TrialKey, Outcome]]:
-        """Yield the trials in the order of `keys`."""
-        for key in keys:
-            with one_thread():
-                outcome = carry_out(run, key)
-            yield key, outcome
+from experiments.trials.threads import ONE_THREAD, environment, n_cores, one_thread
 
 
 @dataclass(slots=True, eq=False)
@@ -83,17 +42,24 @@ class _Worker:
         process = context.Process(target=_serve, args=(there, run), daemon=True)
         # Its start unblocks signals; it must be behind us.
         resource_tracker.ensure_running()
-        with _environment(dict.fromkeys(_ONE_THREAD, "1")), _interrupts_held():
+        with environment(ONE_THREAD), _interrupts_held():
             process.start()
         # The worker's end must be closed here, or its death would not end the pipe.
         there.close()
         return cls(process, here)
 
+    def share(self, shared: Any) -> None:
+        """Hand over what the trials share, once, before the first trial."""
+        self._send(shared)
+
     def take(self, key: TrialKey) -> None:
         self.key = key
+        self._send(key)
+
+    def _send(self, message: Any) -> None:
         # A worker that is dead already shows at the next read.
         with suppress(OSError):
-            self.connection.send(key)
+            self.connection.send(message)
 
     def stop(self, at_once: bool) -> None:
         self.connection.close()
@@ -114,13 +80,18 @@ class Processes:
 
     workers: int | None = None
 
-    def run(self, run: Run, keys: Sequence[TrialKey]) -> Iterator[tuple[TrialKey, Outcome]]:
+    def run(self, keys: Sequence[TrialKey], run: Run, prepare: Prepare) -> Finished:
         """Yield the trials as they finish; one whose worker dies is given to another worker once."""
         waiting, deaths = deque(keys), Counter[TrialKey]()
-        pool = [_Worker.start(run) for _ in range(min(self.workers or _n_cores(), len(keys)))]
+        pool: list[_Worker] = []
         finished = False
         try:
+            for _ in range(min(self.workers or n_cores(), len(keys))):
+                pool.append(_Worker.start(run))
+            # They take seconds to import what `run` needs: that goes on beside this.
+            shared = prepare()
             for worker in pool:
+                worker.share(shared)
                 worker.take(waiting.popleft())
             while busy := [worker for worker in pool if worker.key is not None]:
                 ready = wait([worker.connection for worker in busy])
@@ -131,7 +102,8 @@ class Processes:
                         worker.stop(at_once=True)
                         fresh = _Worker.start(run)
                         pool[pool.index(worker)] = worker = fresh
-                        if deaths[key] < _WORKERS_A_TRIAL:
+                        worker.share(shared)
+                        if deaths[key] < WORKERS_A_TRIAL:
                             waiting.append(key)
                         else:
                             outcome = failed_outcome(key, "The worker process died (killed, or out of memory).", True)
@@ -157,25 +129,6 @@ def _answer(worker: _Worker) -> tuple[TrialKey, Outcome | None]:
     return key, outcome
 
 
-def _n_cores() -> int:
-    # Fewer than the machine has where a container or taskset says so; not every system can tell.
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-@contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in values}
-    os.environ.update(values)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
-
-
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Hold ctrl-C back until the block is over; a process started in it never gets one, also while it imports."""
@@ -192,8 +145,9 @@ def _serve(connection: Connection, run: Run) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with one_thread(), suppress(EOFError):
+        shared = connection.recv()
         while True:
-            connection.send(carry_out(run, connection.recv()))
+            connection.send(carry_out(partial(run, shared), connection.recv()))
 
 
 def _end_with_parent() -> None:
