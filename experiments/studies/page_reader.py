@@ -48,10 +48,9 @@ class PageReader:
         return cut_to_page(image, self.view, self.page.page_size_mm)
 
     def misses(self, image: Array, suffix: str = "") -> dict[str, float]:
-        """Read a picture and count `misses` and its parts; `letters`, `error_rate_percent` and `word_...` too."""
-        read = self.engine.read(self.cut(image), self.capital_px)
-        found = self._count(read)
-        return found.figures(suffix) if suffix else _counts(found) | metrics.match_words(read.split(), self.page.words)
+        """Read a picture and count `misses` and its parts; `letters` and `error_rate_percent` too."""
+        found = self._count(self.engine.read(self.cut(image), self.capital_px))
+        return found.figures(suffix) if suffix else _counts(found)
 
     def shuffled_misses(self, rng: np.random.Generator) -> dict[str, float]:
         """Count the misses of the true letters in random order: what a reading scores that has nothing but them."""

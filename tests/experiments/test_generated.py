@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from deskew.errors import InputError
 from experiments.reporting import generated
 from experiments.reporting.artifact import minutes, with_artifact
 from experiments.reporting.beside import nulls, real
-from experiments.reporting.beside.measures import Once, cell
+from experiments.reporting.beside.measures import Once, Rest, cell, mean
 from experiments.reporting.claims.measures import Evidence, Values
 from experiments.reporting.commands import command
 from experiments.reporting.expectations import EXPECTED, rerun_interval
@@ -169,11 +168,21 @@ def test_what_all_trials_share_is_one_figure(tmp_path: Path) -> None:
     assert cell(other, evidence) == ["–", "–"]
 
 
-@pytest.mark.parametrize("page", [real.real_page, nulls.nulls_page])
-def test_a_page_without_reports_has_dashes(page: Callable[[Evidence], str], tmp_path: Path) -> None:
-    lines = [line for line in page(Evidence(tmp_path)).splitlines() if line.startswith("| ")][2:]
-    assert len(lines) > 5
-    assert all("–" in line for line in lines)
+def test_without_reports_nulls_are_dashes_and_no_pair_stands_beside_nothing(tmp_path: Path) -> None:
+    lines = [line for line in nulls.nulls_page(Evidence(tmp_path)).splitlines() if line.startswith("| ")][2:]
+    assert len(lines) == len(nulls.LINES)
+    assert all(line.endswith("| – | – | – | – |") for line in lines)
+    assert "| 1. " not in real.real_page(Evidence(tmp_path))
+
+
+def test_what_is_not_missed_is_read(tmp_path: Path) -> None:
+    report(tmp_path, "a", [1.0, 2.0, 6.0], {})
+    evidence = Evidence(tmp_path)
+    part = mean("a", "restored", "corner_mean_px", "spring")
+    one, rest = part.figure(evidence), Rest(100.0, part).figure(evidence)
+    assert one.interval is not None
+    assert (rest.value, rest.n) == (97.0, 3)
+    assert rest.interval == (100.0 - one.interval[1], 100.0 - one.interval[0])
 
 
 def test_every_null_has_its_rows() -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from experiments.reporting.claims.claim import mean
-from experiments.reporting.claims.measures import Evidence, Measure, MissingError, Values
+from experiments.reporting.claims.measures import Evidence, Mean, Measure, MissingError, Values
 from experiments.reporting.claims.rules import Figure
 from experiments.reporting.markdown import NONE, with_interval
 
-__all__ = ["Once", "cell", "mean", "sources"]
+__all__ = ["Once", "Rest", "cell", "mean", "sources"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +40,33 @@ class Once:
         if len(found) != 1:
             raise MissingError(self.values.report)
         return Figure(self.scale * found.pop(), None, 1, self.unit, self.digits)
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """What a mean leaves of a whole, such as the letters read of those not missed.
+
+    Attributes
+    ----------
+    whole : float
+        In the mean's unit.
+    part : Mean
+        Taken from it.
+    """
+
+    whole: float
+    part: Mean
+
+    @property
+    def reports(self) -> tuple[str, ...]:
+        """The reports that it reads."""
+        return self.part.reports
+
+    def figure(self, evidence: Evidence) -> Figure:
+        """Return the rest, its interval turned round."""
+        found = self.part.figure(evidence)
+        ends = None if found.interval is None else (self.whole - found.interval[1], self.whole - found.interval[0])
+        return replace(found, value=self.whole - found.value, interval=ends)
 
 
 def cell(measure: Measure | None, evidence: Evidence) -> list[str]:
