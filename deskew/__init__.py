@@ -2,7 +2,7 @@
 
 `deskew.pipeline` chains the stages: `acquisition` (section 2), `flattening` (section 3), `restoration` (section 3.5);
 `deskew.metrics` measures the result, `deskew.io` reads and writes, `deskew.types` is what passes between them.
-`deskew.flatten` flattens a surface of anyone's.
+`deskew.flatten` flattens a surface of anyone's; `flattener`, `restorer` and `dewarper` mark methods of anyone's own.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from deskew.plugins import dewarper, flattener, restorer
+
 if TYPE_CHECKING:
     from deskew.types import Array, Flattened, Floats
 
-__all__ = ["flatten"]
+__all__ = ["dewarper", "flatten", "flattener", "restorer"]
 
 
 def flatten(
@@ -35,7 +37,8 @@ def flatten(
         Triangles: one piece with a border; holes and overhangs are welcome.
     method : str
         `spring`, the best one; `paper_euler` or `paper_rk4`, the paper's particle system (grids only); `lscm`, `arap`
-        or `slim` of libigl, if that is installed; or `package.module:function`.
+        or `slim` of libigl, if that is installed; or a flattener of your own, as `package.module:function` or by the
+        name of an entry point in `deskew.methods`.
     noise_mm : float or "auto"
         Standard deviation of the scanner's noise across the sheet [mm], to be removed first; "auto" estimates it. For
         `spring` alone.

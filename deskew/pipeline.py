@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,7 @@ from deskew import acquisition, flattening, restoration
 from deskew.acquisition import DecoderSettings, DenoiseSettings, DepthSettings, InkSettings, Outline, SweepSettings
 from deskew.errors import StepError, require
 from deskew.io import StiffnessMap
+from deskew.plugins import Kind, kind_of, name_of
 from deskew.projection import project
 from deskew.recipes import BEST, Recipe
 from deskew.restoration import Textures
@@ -28,6 +30,8 @@ from deskew.types import (
     Scan,
     Status,
 )
+
+Method = str | Callable[..., Any]
 
 # Smoothing of a surface's normals, for an unfiltered and for a filtered depth map.
 _NORMALS_PX = {False: 2.0, True: 0.6}
@@ -254,7 +258,7 @@ def with_stiffness(scan: Scan, materials: StiffnessMap) -> Scan:
 
 
 def restore(
-    scan: Scan, *, method: str = flattening.DEFAULT, light: str = WHITE, scale: float = 1.0, **settings: object
+    scan: Scan, *, method: Method = flattening.DEFAULT, light: str = WHITE, scale: float = 1.0, **settings: object
 ) -> Restoration:
     """Flatten a scan and render the page as if it had never been bent (sections 3 and 3.5).
 
@@ -262,8 +266,9 @@ def restore(
     ----------
     scan : Scan
         The page.
-    method : str
-        A flattening method's name, or "package.module:function".
+    method : str or callable
+        A flattening method's name, or a flattener or restorer from outside, by its name or itself. A restorer restores
+        the white image as it is.
     light : str
         Which of the scan's images to restore.
     scale : float
@@ -277,6 +282,11 @@ def restore(
         If the flattening diverged: there is nothing to texture.
     """
     require(light in scan.images, "light", f"be one of {', '.join(scan.images)}", light)
+    function = method if callable(method) else flattening.find_method(method)
+    if kind_of(function) is Kind.RESTORER:
+        plain = light == WHITE and scale == 1.0 and not settings
+        require(plain, "method", "be a flattener for another light, scale or setting", f"`{name_of(method)}`")
+        return restoration.restore_by(function, scan)
     flattened = _flattened(scan, method, settings)
     return restoration.restore_textures(scan, flattened, [light], scale).restoration(light)
 
@@ -284,7 +294,7 @@ def restore(
 def restore_lights(
     scan: Scan,
     *,
-    method: str = flattening.DEFAULT,
+    method: Method = flattening.DEFAULT,
     lights: Iterable[str] | None = None,
     scale: float = 1.0,
     **settings: object,
@@ -295,8 +305,8 @@ def restore_lights(
     ----------
     scan : Scan
         The page.
-    method : str
-        A flattening method's name, or "package.module:function".
+    method : str or callable
+        A flattening method's name, or a flattener from outside, by its name or itself.
     lights : names, optional
         Which of the scan's images to restore; all if not given.
     scale : float
@@ -320,7 +330,7 @@ def restore_lights(
     return restoration.restore_textures(scan, _flattened(scan, method, settings), wanted, scale)
 
 
-def _flattened(scan: Scan, method: str, settings: Mapping[str, object]) -> Flattened:
+def _flattened(scan: Scan, method: Method, settings: Mapping[str, object]) -> Flattened:
     flattened = flattening.flatten(scan.sheet, method=method, **settings)
     if flattened.status is Status.DIVERGED:
         raise StepError(f"Flattening diverged: {flattened.remedy}")

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from deskew.errors import InputError, StepError
+from deskew.own.confinement import hidden
 from experiments.progress import Progress
 from experiments.reporting.export import Results, require_targets, write_report
 from experiments.reporting.provenance import provenance
 from experiments.settings import Config
-from experiments.studies import Study, find_study
+from experiments.studies import Study, about_own, find_study
 from experiments.trials import Engine, Outcome, Row, Store, TrialKey, chosen_engine, fingerprint, settings_of
 from experiments.trials.threads import one_thread
 
@@ -54,7 +55,8 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
     study = find_study(config.experiment)
     keys = study.plan(config)
     require_targets(out, study.layout)
-    about = study.about(config)
+    own = about_own(config)
+    about = {**study.about(config), **own}
     settings = settings_of(config, study.inputs(config))
     identity = fingerprint({**settings, **about})
     engine = chosen_engine(config.engine, out, identity)
@@ -64,7 +66,9 @@ def carry_out_campaign(config: Config, out: Path) -> Finished:
         missing = [key for key in keys if key not in finished]
         if missing:
             progress = Progress(config.experiment, len(keys) - len(missing), len(keys))
-            _run(study, config, missing, engine, store, progress)
+            # What the trials share is in this process too, and no method of somebody's is to read it there.
+            with hidden() if own else nullcontext():
+                _run(study, config, missing, engine, store, progress)
         prepared = _prepare_key(config)
         results = Results(
             store.rows(keys), store.rows([*keys, prepared], "timing"), store.failures(keys), store.pictures(keys)

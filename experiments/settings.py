@@ -387,6 +387,18 @@ class CullingSettings(Checked):
 
 
 @dataclass
+class OwnSettings(Checked):
+    """What one call of a method that is not built in may take: it runs in a process of its own (docs/own-method.md).
+
+    `seconds`: wall clock, the start of its interpreter included. `memory_mb`: address space.
+    """
+
+    group: ClassVar[str] = "own."
+    seconds: float = number(120.0, 0.1, 86400.0, "s")
+    memory_mb: int = count(4096, 256, 1 << 20)
+
+
+@dataclass
 class DecodersSettings(Checked):
     """The comparison of decoders. `frames`: numbers of frames at which the patterns are compared."""
 
@@ -449,6 +461,7 @@ class Config(Checked):
     rig: RigSettings = field(default_factory=RigSettings)
     scan: ScanSettings = field(default_factory=ScanSettings)
     mesh: MeshSettings = field(default_factory=MeshSettings)
+    own: OwnSettings = field(default_factory=OwnSettings)
     integrators: IntegratorsSettings = field(default_factory=IntegratorsSettings)
     settling: SettlingSettings = field(default_factory=SettlingSettings)
     culling: CullingSettings = field(default_factory=CullingSettings)

@@ -11,6 +11,7 @@ import typer
 from deskew.cli.options import Json, Method, Stiffness
 from deskew.cli.printing import flattened_figures, report, say
 from deskew.errors import StepError, require
+from deskew.plugins import Kind, kind_of
 
 if TYPE_CHECKING:
     from deskew.io import Mesh
@@ -71,11 +72,13 @@ def flatten(
     report(figures, as_json, output)
 
 
-def require_method(method: str) -> None:
-    """Refuse an unknown method before the long work rather than after it."""
+def require_method(method: str, kinds: tuple[Kind, ...] = (Kind.FLATTENER,)) -> Kind:
+    """Refuse an unknown method, or one of another kind, before the long work rather than after it."""
     from deskew.flattening import find_method
 
-    find_method(method)
+    kind = kind_of(find_method(method))
+    require(kind in kinds, "--method", f"be a {' or '.join(kinds)} here", f"{method}, a {kind}")
+    return kind
 
 
 def _settings(method: str, noise: str | None) -> dict[str, float | str]:

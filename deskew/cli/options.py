@@ -30,7 +30,7 @@ Method = Annotated[
         "--method",
         "-m",
         help="spring (the best), paper_euler or paper_rk4 (the paper's), lscm, arap or slim (libigl's), "
-        "or package.module:function.",
+        "or one of your own: package.module:function or an installed entry point, run in this very process.",
     ),
 ]
 Lights = Annotated[

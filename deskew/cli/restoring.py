@@ -28,6 +28,7 @@ from deskew.cli.pictures import PICTURES, Wanted, write_pictures
 from deskew.cli.printing import flattened_figures, projector_figures, report
 from deskew.cli.scanning import Scanning, scan_page
 from deskew.errors import require
+from deskew.plugins import Kind
 
 if TYPE_CHECKING:
     from deskew.types import Scan
@@ -60,6 +61,7 @@ def restore(
     io.require_writable(output, PICTURES)
     wanted = Wanted.of(output, lights, combine, scale)
     settings = _settings(method, free_scale, stiffness)
+    kind = _kind(method, wanted, stiffness)
     materials = None if stiffness is None else io.read_stiffness(stiffness)
     found = io.read_scan(scan_file)
     wanted.check(list(found.images))
@@ -67,7 +69,10 @@ def restore(
         from deskew import pipeline
 
         found = pipeline.with_stiffness(found, materials)
-    restore_page(found, method, wanted, as_json, settings)
+    if kind is Kind.FLATTENER:
+        restore_page(found, method, wanted, as_json, settings)
+    else:
+        _restore_whole(found, method, kind, output, as_json)
 
 
 def run(
@@ -98,12 +103,38 @@ def run(
     from deskew import io
 
     io.require_writable(output, PICTURES)
-    require_method(method)
     wanted = Wanted.of(output, lights, combine, scale)
+    kind = _kind(method, wanted, stiffness)
     settings = _settings(method, free_scale, stiffness)
     how = Scanning(shape, mask, method, ink, denoise, stiffness)
     page = scan_page(capture, io.read_calibration(calibration), how, wanted)
-    restore_page(page, method, wanted, as_json, settings)
+    if kind is Kind.FLATTENER:
+        restore_page(page, method, wanted, as_json, settings)
+    else:
+        _restore_whole(page, method, kind, output, as_json)
+
+
+def _kind(method: str, wanted: Wanted, stiffness: Path | None) -> Kind:
+    """Return the method's kind; one that restores the page as a whole makes one picture of the white light."""
+    kind = require_method(method, tuple(Kind))
+    if kind is not Kind.FLATTENER:
+        asked = {"--light": wanted.lights, "--combine": wanted.combine, "--stiffness": stiffness}
+        for option, value in (asked | {"--scale": wanted.scale if wanted.scale != 1.0 else None}).items():
+            require(not value, option, f"be left out: {method}, a {kind}, restores the white image alone", value)
+    return kind
+
+
+def _restore_whole(found: Scan, method: str, kind: Kind, output: Path, as_json: bool) -> None:
+    """Let a restorer or a dewarper make the page's picture, and write it."""
+    from deskew import flattening, pipeline, restoration
+    from deskew.types import WHITE
+
+    if kind is Kind.DEWARPER:
+        image = restoration.dewarp_by(flattening.find_method(method), found.images[WHITE]).image
+    else:
+        image = pipeline.restore(found, method=method).image
+    write_pictures({WHITE: image}, {WHITE: output})
+    report({"restored": str(output), "method": method, "kind": str(kind)}, as_json, output)
 
 
 def _settings(method: str, free_scale: bool, stiffness: Path | None) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""Flattening methods by name; a method from outside is named `package.module:function`."""
+"""Flattening methods by name, and anybody's own."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from deskew.errors import DeskewError, StepError, in_one_line, require
 from deskew.flattening.dynamics import settle
 from deskew.flattening.outside import Outside
 from deskew.flattening.peers import PEERS
-from deskew.flattening.plugins import load_function
 from deskew.flattening.schemes import INTEGRATORS, Scheme
 from deskew.flattening.settings import ParticleSettings, settings_of
 from deskew.flattening.spring import flatten_spring
+from deskew.plugins import OUTSIDE, Kind, kind_of, load, name_of
 from deskew.types import Flattened, Sheet, Status
 
 Flattener = Callable[..., Flattened]
@@ -29,8 +29,9 @@ def find_integrator(name: str) -> Scheme | Outside:
         If there is no such integrator.
     """
     known = f"one of {', '.join(INTEGRATORS)}, or package.module:function"
-    require(isinstance(name, str), "integrator", f"be {known}", repr(name))
-    return INTEGRATORS[name] if name in INTEGRATORS else Outside(name, load_function(name, "integrator", known))
+    named = isinstance(name, str) and (name in INTEGRATORS or ":" in name)
+    require(named, "integrator", f"be {known}", repr(name))
+    return INTEGRATORS[name] if name in INTEGRATORS else Outside(name, load(name, "integrator", known))
 
 
 def flatten_particles(sheet: Sheet, *, integrator: str = "euler", **settings: object) -> Flattened:
@@ -80,36 +81,36 @@ METHODS: dict[str, Flattener] = {
 DEFAULT = "spring"
 
 
-def find_method(name: str) -> Flattener:
+def find_method(name: str) -> Callable[..., Any]:
     """Look a method up.
 
     Parameters
     ----------
     name : str
-        A key of `METHODS`, or `package.module:function` for a function that takes a `Sheet` and keyword settings and
-        returns a `Flattened`.
+        A key of `METHODS`, or as of :func:`deskew.plugins.locate` for a function from outside, of any kind: a flattener
+        takes a `Sheet` and keyword settings and returns a `Flattened`.
 
     Raises
     ------
     InputError
         If there is no such method.
     """
-    known = f"one of {', '.join(METHODS)}, or package.module:function"
+    known = f"one of {', '.join(METHODS)}, or {OUTSIDE}"
     require(isinstance(name, str), "method", f"be {known}", repr(name))
-    return METHODS[name] if name in METHODS else load_function(name, "method", known)
+    return METHODS[name] if name in METHODS else load(name, "method", known)
 
 
-def flatten(sheet: Sheet, *, method: str = DEFAULT, **settings: object) -> Flattened:
+def flatten(sheet: Sheet, *, method: str | Flattener = DEFAULT, **settings: object) -> Flattened:
     """Flatten a sheet onto Z = 0.
 
     Parameters
     ----------
     sheet : Sheet
         The surface in the world [mm].
-    method : str
+    method : str or callable
         `spring` (the same springs solved for rest at once), `paper_euler` or `paper_rk4` (the paper's particle system,
         section 3), `particles` (the same with any `integrator`), `lscm`, `arap` or `slim` of libigl, if it is
-        installed, or `package.module:function`.
+        installed, or one from outside by its name (see :func:`deskew.plugins.locate`) or itself.
     **settings
         Of the method: the fields of `StaticSettings` for `spring`, of `ParticleSettings` for the particle system.
 
@@ -126,16 +127,18 @@ def flatten(sheet: Sheet, *, method: str = DEFAULT, **settings: object) -> Flatt
         If a method from outside raises or exits, or returns something else than a `Flattened` of the sheet's shape,
         finite unless its status is `DIVERGED`.
     """
-    function = find_method(method)
+    function = method if callable(method) else find_method(method)
+    kind, name = kind_of(function), name_of(method)
+    require(kind is Kind.FLATTENER, "method", "be a flattener where a sheet is flattened", f"`{name}`, a {kind}")
     try:
         result = function(sheet, **settings)
     except DeskewError:
         raise
     except (Exception, SystemExit) as error:
-        if method in METHODS:
+        if name in METHODS:
             raise
-        raise StepError(f"Flattening by `{method}` failed: {in_one_line(error)}.") from error
-    _require_result(result, sheet, method)
+        raise StepError(f"Flattening by `{name}` failed: {in_one_line(error)}.") from error
+    _require_result(result, sheet, name)
     return result
 
 

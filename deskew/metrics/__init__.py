@@ -1,6 +1,6 @@
 """How well a page was restored: figures against the control or against truth, named as in the result tables."""
 
-from deskew.metrics.alignment import Alignment, fit_affine, fit_rigid
+from deskew.metrics.alignment import Alignment, fit_affine, fit_rigid, fit_similar, require_not_mirrored
 from deskew.metrics.corners import corner_distance
 from deskew.metrics.coverage import page_coverage
 from deskew.metrics.dense import dense_error
@@ -17,6 +17,7 @@ from deskew.metrics.similarity import ms_ssim
 from deskew.metrics.straightness import line_straightness
 from deskew.metrics.strain import flat_error, sheet_strain
 from deskew.metrics.stretch import sheet_stretch
+from deskew.metrics.unscaled import similar_corner_distance, similar_dense_error
 
 __all__ = [
     "Alignment",
@@ -29,6 +30,7 @@ __all__ = [
     "depth_error",
     "fit_affine",
     "fit_rigid",
+    "fit_similar",
     "flat_error",
     "flow_distortion",
     "image_difference",
@@ -40,9 +42,12 @@ __all__ = [
     "ocr_engine",
     "page_coverage",
     "region_error",
+    "require_not_mirrored",
     "score_flattening",
     "sheet_strain",
     "sheet_stretch",
     "shifted",
     "shuffled",
+    "similar_corner_distance",
+    "similar_dense_error",
 ]

@@ -1,6 +1,7 @@
 """Bring two point sets into alignment by least squares: rigidly, or affinely as the paper does (section 4.1).
 
-Affine alignment hides a wrong scale, aspect or shear, and a mirrored result; rigid alignment hides none of them.
+Affine alignment hides a wrong scale, aspect or shear, and a mirrored result; rigid alignment hides none of them. What
+has no scale of its own, such as a picture at any size, can be aligned similarly: that hides a wrong scale alone.
 """
 
 from __future__ import annotations
@@ -82,6 +83,27 @@ def fit_affine(source: Floats, target: Floats) -> Alignment:
     require(int(rank) == 2, "source", "span a plane", "points on one line")
     matrix = solution.T
     return Alignment(matrix, target.mean(axis=0) - matrix @ middle)
+
+
+def fit_similar(source: Floats, target: Floats) -> Alignment:
+    """Least-squares rotation, translation and one scale, without reflection (Umeyama 1991): for what has no scale.
+
+    Parameters
+    ----------
+    source, target : (N, 2) arrays, N >= 2
+        Corresponding points; `source` not all in one place.
+
+    Returns
+    -------
+    Alignment
+        Takes `source` to `target`.
+    """
+    turn = fit_rigid(source, target).matrix
+    p, q = source - source.mean(axis=0), target - target.mean(axis=0)
+    spread = float((p**2).sum())
+    require(spread > 0, "source", "span a line", "points in one place")
+    matrix = turn * (float(((p @ turn.T) * q).sum()) / spread)
+    return Alignment(matrix, target.mean(axis=0) - matrix @ source.mean(axis=0))
 
 
 def require_not_mirrored(source: Floats, target: Floats, what: str) -> None:

@@ -13,6 +13,8 @@ from deskew.restoration.combine import (
     require_combination,
 )
 from deskew.restoration.registration import Registration, register
+from deskew.restoration.restorers import dewarp_by, restore_by
+from deskew.restoration.sampling import read_at
 from deskew.restoration.shading import UNSHADED, divide_by_local_white, remove_shading, surface_points
 from deskew.restoration.textures import Textures, register_textures, restore_textures
 from deskew.restoration.warp import texture_quads, undistorted_view, undistortion_map, view_camera
@@ -24,6 +26,7 @@ __all__ = [
     "Textures",
     "as_picture",
     "combined",
+    "dewarp_by",
     "divide_by_local_white",
     "lights_of",
     "maximum",
@@ -31,10 +34,12 @@ __all__ = [
     "pictures_of",
     "principal_components",
     "ratio",
+    "read_at",
     "register",
     "register_textures",
     "remove_shading",
     "require_combination",
+    "restore_by",
     "restore_textures",
     "surface_points",
     "texture_quads",

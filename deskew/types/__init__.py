@@ -19,7 +19,7 @@ from deskew.types.captures import (
 )
 from deskew.types.depth import Correspondence, DepthMap, ProjectorCheck, Reason
 from deskew.types.devices import Board, Calibration, Pinhole
-from deskew.types.pages import Flattened, Restoration, Scan, Sheet, Status
+from deskew.types.pages import Dewarped, Flattened, Restoration, Scan, Sheet, Status
 
 __all__ = [
     "WHITE",
@@ -29,6 +29,7 @@ __all__ = [
     "Capture",
     "Correspondence",
     "DepthMap",
+    "Dewarped",
     "Flattened",
     "Floats",
     "Frames",

@@ -200,10 +200,26 @@ class Restoration:
     camera : Pinhole
         The ideal camera that the view is seen through.
     flattened : Flattened or None
-        The geometry behind it; None for an image-only method.
+        The geometry behind it, where the method tells it.
     """
 
     image: Array
     backward_map: npt.NDArray[np.float32]
     camera: Pinhole
     flattened: Flattened | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Dewarped:
+    """A page flattened in its picture alone, without knowledge of its shape.
+
+    Attributes
+    ----------
+    image : (height, width[, 3]) array
+        The flat page, at the method's own size: it has no scale.
+    backward_map : (height, width, 2) float32 array or None
+        Raw camera pixel (x, y) that each pixel came from, NaN where it shows nothing; None if the method has none.
+    """
+
+    image: Array
+    backward_map: npt.NDArray[np.float32] | None = None

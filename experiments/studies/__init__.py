@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from experiments.studies.own_sources import about_own
 from experiments.studies.study import AbsentError, Study
 
 # name of the experiment: module and class; `conf/experiment/NAME.yaml` goes with each.
@@ -34,4 +35,4 @@ def find_study(name: str) -> Study:
     return study
 
 
-__all__ = ["STUDIES", "AbsentError", "Study", "find_study"]
+__all__ = ["STUDIES", "AbsentError", "Study", "about_own", "find_study"]

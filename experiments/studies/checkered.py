@@ -8,8 +8,9 @@ import numpy as np
 
 from data_synth import Checkerboard, Truth
 from deskew import metrics, restoration
-from deskew.types import Array, Capture, DepthMap, Floats, Pinhole, Restoration, Scan
+from deskew.types import Array, Capture, DepthMap, Dewarped, Floats, Pinhole, Restoration, Scan
 from experiments.studies.flattened import flattening_figures
+from experiments.studies.placed import Placed, board_corners
 from experiments.studies.views import DETECTORS, Detector, restored_corners, seen_corners
 from experiments.trials import Recorder, reason_of
 
@@ -85,6 +86,35 @@ class CheckeredPage:
         self.record.add(condition, method, figures)
         self._compare(condition, method, restored.image, restored_corners(uv, self.corners_mm))
 
+    def measure_dewarped(self, condition: str, method: str, dewarped: Dewarped) -> Array | None:
+        """Record what is measured on a picture that was flattened by itself; return it in the control's frame.
+
+        It has a size of its own, so it is laid onto the control by the corners that are found in it: by its backward
+        map and the truth, or as a board like any other if it has none. There are no rigid figures, since it has no
+        scale.
+        """
+        control = next(iter(self.control.values()))
+        try:
+            if dewarped.backward_map is None:
+                figures, seeds = {}, board_corners(dewarped.image, self.page.squares, self.view.size)
+            else:
+                uv = self.truth.page_at(dewarped.backward_map.astype(np.float64))
+                figures = metrics.similar_dense_error(dewarped, uv, self.page.page_size_mm)
+                seeds = restored_corners(uv, self.corners_mm)
+            placed = Placed.onto(self.view, dewarped.image, seeds, control)
+        except Exception as error:
+            self.fail(condition, method, error)
+            return None
+        self.record.add(condition, method, figures)
+        for name, detect in self.detectors.items():
+            with self.record.attempt(f"{condition}{name}", method):
+                found = detect(placed.image, placed.to_view.apply(seeds))
+                distance = metrics.corner_distance(found, self.control[name], self.view)
+                figures = {metric: value for metric, value in distance.items() if "rigid" not in metric}
+                figures |= metrics.similar_corner_distance(placed.to_own.apply(found), self.control[name], self.view)
+                self.record.add(f"{condition}{name}", method, figures | _kept(distance))
+        return placed.image
+
     def depth_figures(self, depth: DepthMap, prefix: str = "depth_raw") -> dict[str, float]:
         """Measure a depth map against the truth."""
         true_points = self.truth.points_at(restoration.undistortion_map(self.camera).astype(np.float64))
@@ -100,5 +130,10 @@ class CheckeredPage:
             with self.record.attempt(f"{condition}{name}", method):
                 found = detect(image, seeds)
                 distance = metrics.corner_distance(found, self.control[name], self.view)
-                kept = distance["corner_mean_px"] <= PAPER_PX and distance["corner_mean_mm"] <= PAPER_MM
-                self.record.add(f"{condition}{name}", method, distance | {"meets_paper": float(kept)})
+                self.record.add(f"{condition}{name}", method, distance | _kept(distance))
+
+
+def _kept(distance: Mapping[str, float]) -> dict[str, float]:
+    """Say whether a page keeps the paper's limits, which are of affine figures."""
+    kept = distance["corner_mean_px"] <= PAPER_PX and distance["corner_mean_mm"] <= PAPER_MM
+    return {"meets_paper": float(kept)}

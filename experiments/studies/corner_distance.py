@@ -10,13 +10,14 @@ import data_synth
 from data_synth import Checkerboard
 from deskew import acquisition, pipeline, restoration
 from deskew.errors import require
+from deskew.plugins import Kind
 from deskew.recipes import Recipe
 from deskew.types import Array, Capture, Scan
 from experiments.reporting import Column, FigurePage, Layout, Numbers, Plot, Tails, Versus
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.checkered import PAPER_MM, PAPER_PX, CheckeredPage
-from experiments.studies.methods import require_methods
+from experiments.studies.methods import dewarped_by, kind_of, method_of, require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.recipes import calibration_mode, methods_by_recipe
 from experiments.studies.study import Study
@@ -31,7 +32,9 @@ class CornerDistance(Study):
     """Crumpled checkerboards, scanned, flattened and restored: by the best method, and by the paper's.
 
     A method comes with its way to scan (`deskew.recipes.recipe_for`): the paper's as in the paper, all others with the
-    ink corrected and the depth map filtered. What `scan.*` sets holds for all methods.
+    ink corrected and the depth map filtered. What `scan.*` sets holds for all methods. One that sees the picture alone
+    has no rigid figures but `corner_similar_*`, after a rotation, a translation and a scale, and dense ones, likewise
+    `dense_similar_*`, only with a backward map.
 
     Conditions
     ----------
@@ -62,7 +65,10 @@ class CornerDistance(Study):
             Column("meets_paper", "within the paper's", headline=True, share=True),
             Column("corner_rigid_mean_mm", "rigid mean [mm]", 3, headline=True),
             Column("corner_rigid_max_mm", "rigid max [mm]", 3),
+            Column("corner_similar_mean_mm", "similar mean [mm]", 3),
+            Column("corner_similar_max_mm", "similar max [mm]", 3),
             Column("dense_mean_mm", "dense mean [mm]", 3, headline=True),
+            Column("dense_similar_mean_mm", "dense similar mean [mm]", 3),
             Column("page_coverage", "coverage", 4, headline=True),
             Column("detector_rms_px", "detector RMS [px]", 3, headline=True),
             Column("corners_missing", "missing", 0, headline=True),
@@ -152,6 +158,9 @@ class CornerDistance(Study):
         trial.picture("crumpled", checked.measure_unrestored(capture))
         record.add("unrestored", "-", bench.residuals() | severity(sheet))
         recipes = methods_by_recipe(config)
+        for method in config.methods:
+            if kind_of(config, method) is Kind.DEWARPER:
+                trial.dewarped(config, capture, method, shown=method == config.methods[0])
         for recipe, methods in recipes.items():
             # What all methods share stands by itself; else each method has its own scan's figures.
             shared_by = ["-"] if len(recipes) == 1 else methods
@@ -159,7 +168,7 @@ class CornerDistance(Study):
             if scan is None:
                 continue
             for method in methods:
-                trial.restored(scan, method, shown=method == config.methods[0])
+                trial.restored(config, scan, method, shown=method == config.methods[0])
         return record.outcome()
 
 
@@ -198,11 +207,23 @@ class _Trial:
             self.picture("model", model_view(seen))
         return scan
 
-    def restored(self, scan: Scan, method: str, *, shown: bool) -> None:
+    def dewarped(self, config: Config, capture: Capture, method: str, *, shown: bool) -> None:
+        """Let a method flatten the picture alone and measure the result."""
+        try:
+            with self.record.stage("restore", "restored", method):
+                found = dewarped_by(config, method, capture.white)
+        except Exception as error:
+            self.checked.fail("restored", method, error)
+            return
+        image = self.checked.measure_dewarped("restored", method, found)
+        if shown and image is not None:
+            self.picture(f"restored_{method}", image)
+
+    def restored(self, config: Config, scan: Scan, method: str, *, shown: bool) -> None:
         """Restore by one method and measure the result."""
         try:
             with self.record.stage("restore", "restored", method):
-                restored = pipeline.restore(scan, method=method)
+                restored = pipeline.restore(scan, method=method_of(config, method))
         except Exception as error:
             self.checked.fail("restored", method, error)
             return

@@ -14,14 +14,15 @@ from data_synth import Lettered, Light, Text, Truth
 from deskew import metrics, pipeline, projection, restoration
 from deskew.errors import require
 from deskew.metrics import OcrEngine, OcrSettings
+from deskew.plugins import Kind
 from deskew.recipes import Recipe
 from deskew.restoration import UNSHADED
-from deskew.types import WHITE, Array, Flattened, Floats, Scan, Sheet, Status
+from deskew.types import WHITE, Array, Flattened, Floats, Restoration, Scan, Sheet, Status
 from experiments.reporting import Layout
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
-from experiments.studies.methods import require_methods
+from experiments.studies.methods import dewarped_by, kind_of, method_of, require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.ocr_layout import LAYOUT
 from experiments.studies.page_reader import PageReader, shading_percent
@@ -59,7 +60,8 @@ class OcrMisses(Study):
     `unrestored`
         The crumpled page as the camera sees it; here too its sheet and the calibration.
     `restored`
-        The restored page, a row of figures for each method.
+        The restored page, a row of figures for each method. Somebody's restorer or dewarper is given the page under the
+        soft light, and what it returns is read; no other light is.
     `ideal`
         The crumpled page warped back by its true shape: the misses that no scan and no flattening can help.
     `unrestored/slope=S`, `restored/slope=S`, `ideal/slope=S`
@@ -129,6 +131,9 @@ class OcrMisses(Study):
         for recipe in trial.scans:
             for method in methods_by_recipe(config)[recipe]:
                 trial.measure_restored(recipe, method)
+        for method in config.methods if config.ocr.restore else ():
+            if kind_of(config, method) is Kind.DEWARPER:
+                trial.measure_dewarped(method)
         return trial.record.outcome()
 
 
@@ -213,16 +218,43 @@ class _Trial:
         condition, scan = f"restored{self.at}", self.scans[recipe]
         with self.record.attempt(condition, method):
             with self.record.stage("restore", condition, method):
-                lights = (WHITE, SOFT.name, UNSHADED)
-                restored = pipeline.restore_lights(scan, method=method, lights=lights)
+                restored, images = self._restored(scan, method)
             uv = self.truth.page_at(restored.backward_map.astype(np.float64))
-            figures = metrics.dense_error(restored.restoration(WHITE), uv, self.page.page_size_mm)
-            figures |= flattening_figures(scan.sheet, restored.flattened)
+            figures = metrics.dense_error(restored, uv, self.page.page_size_mm)
+            if restored.flattened is not None:
+                figures |= flattening_figures(scan.sheet, restored.flattened)
             filtered = {"prefix": "depth"} if recipe.denoise else {}
             figures |= metrics.depth_error(scan.depth, self.truth.points_at(self.pixels), **filtered)
-            self.record.add(condition, method, figures | self._read(condition, method, restored.images, uv))
-            if method == self.config.methods[0]:
-                self._picture(f"restored_{method}", restored.images[SOFT.name])
+            self.record.add(condition, method, figures | self._read(condition, method, images, uv))
+            self._shown(method, images[SOFT.name])
+
+    def _restored(self, scan: Scan, method: str) -> tuple[Restoration, Mapping[str, Array]]:
+        """Restore by one method; return the pictures by light too, of a restorer the one that it was given."""
+        if kind_of(self.config, method) is Kind.RESTORER:
+            soft = replace(scan, images={WHITE: self.capture.textures[SOFT.name]})
+            whole = pipeline.restore(soft, method=method_of(self.config, method))
+            return whole, {SOFT.name: whole.image}
+        lights = (WHITE, SOFT.name, UNSHADED)
+        restored = pipeline.restore_lights(scan, method=method_of(self.config, method), lights=lights)
+        return restored.restoration(WHITE), restored.images
+
+    def measure_dewarped(self, method: str) -> None:
+        """Let a method flatten the picture alone; read it where the flat page lies."""
+        condition = f"restored{self.at}"
+        with self.record.attempt(condition, method):
+            with self.record.stage("restore", condition, method):
+                found = dewarped_by(self.config, method, self.capture.textures[SOFT.name])
+            uv, figures = None, {}
+            if found.backward_map is not None:
+                uv = self.truth.page_at(found.backward_map.astype(np.float64))
+                figures = metrics.similar_dense_error(found, uv, self.page.page_size_mm)
+            image = self.reader.placed(found.image, uv)
+            self.record.add(condition, method, figures | self._read(condition, method, {SOFT.name: image}, None))
+            self._shown(method, image)
+
+    def _shown(self, method: str, image: Array) -> None:
+        if method == self.config.methods[0]:
+            self._picture(f"restored_{method}", image)
 
     def _read_as_it_lies(self, condition: str, images: Mapping[str, Array], truth: Truth) -> dict[str, float]:
         """Read raw images of a page, undistorted and no more."""
@@ -230,14 +262,16 @@ class _Trial:
         views = {light: restoration.undistorted_view(image, self.camera) for light, image in images.items()}
         return self._read(condition, "-", views, uv)
 
-    def _read(self, condition: str, method: str, views: Mapping[str, Array], uv: Floats) -> dict[str, float]:
-        """Return the figures of a page's pictures by light, with the true page coordinates of their pixels."""
-        soft, blank = views[SOFT.name], self.reader.blank(uv)
+    def _read(self, condition: str, method: str, views: Mapping[str, Array], uv: Floats | None) -> dict[str, float]:
+        """Return the figures of a page's pictures by light, with the true page coordinates of their pixels if known."""
+        soft, blank = views[SOFT.name], None if uv is None else self.reader.blank(uv)
         with self.record.stage("ocr", condition, method):
             figures = self.reader.misses(soft)
-        figures |= self.reader.normalised_misses(soft) | {"shading_percent": shading_percent(soft, blank)}
+        figures |= self.reader.normalised_misses(soft)
+        if blank is not None:
+            figures["shading_percent"] = shading_percent(soft, blank)
         for suffix, light in _UNDER.items():
-            if light in views and not self.at:
+            if light in views and blank is not None and not self.at:
                 figures |= self.reader.misses(views[light], suffix)
                 figures[f"shading{suffix}_percent"] = shading_percent(views[light], blank)
         if self.control is not None:

@@ -11,6 +11,7 @@ from data_synth import Lettered
 from deskew import metrics, projection, restoration
 from deskew.metrics import Misses, OcrEngine
 from deskew.types import Array, Floats, Pinhole
+from experiments.studies.placed import Placed
 
 INSET_MM = 6.0
 """All pictures are cut alike: to the flat page's place less this border, so that a flat page shows no desk."""
@@ -46,6 +47,28 @@ class PageReader:
     def cut(self, image: Array) -> Array:
         """Cut a picture (height, width) to the flat page's place."""
         return cut_to_page(image, self.view, self.page.page_size_mm)
+
+    def placed(self, image: Array, true_uv: Floats | None) -> Array:
+        """Bring a picture of the page alone, at any size, to where the flat page lies in the view.
+
+        Parameters
+        ----------
+        image : (h, w) array
+            The picture.
+        true_uv : (h, w, 2) array or None
+            True page coordinates of its pixels [mm], NaN off the page; without them its edges are taken for the page's.
+        """
+        own: Floats
+        uv: Floats
+        page = np.array(self.page.page_size_mm)
+        height, width = image.shape[:2]
+        if true_uv is None:
+            share = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+            own, uv = np.asarray(share * (width, height) - 0.5), np.asarray(share * page)
+        else:
+            own, uv = projection.pixel_grid((width, height)).reshape(-1, 2), np.asarray(true_uv).reshape(-1, 2)
+        flat = np.column_stack([(uv - page / 2) * (1.0, -1.0), np.zeros(len(uv))])
+        return Placed.onto(self.view, image, own, projection.project(self.view, flat)).image
 
     def misses(self, image: Array, suffix: str = "") -> dict[str, float]:
         """Read a picture and count `misses` and its parts; `letters` and `error_rate_percent` too."""

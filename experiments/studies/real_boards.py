@@ -13,13 +13,14 @@ import numpy as np
 from deskew import acquisition, io, metrics, pipeline, projection, restoration
 from deskew.acquisition import BoardView, DenoiseSettings, DepthSettings, InkSettings, Outline
 from deskew.errors import InputError, require
+from deskew.plugins import Kind
 from deskew.recipes import Recipe
 from deskew.types import Array, Board, Calibration, Capture, DepthMap, Floats, Pinhole, Restoration, Scan, Sheet
 from experiments.reporting import Column, Layout, Montage
 from experiments.settings import Config
 from experiments.studies.bench import calibration_figures
 from experiments.studies.flattened import flattening_figures
-from experiments.studies.methods import require_methods
+from experiments.studies.methods import method_of, require_methods
 from experiments.studies.recipes import methods_by_recipe
 from experiments.studies.scanned import scanned_points
 from experiments.studies.study import AbsentError, Study
@@ -91,7 +92,8 @@ class RealBoards(Study):
 
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial a board left out, and one for all boards."""
-        require_methods(config)
+        # A picture alone has no units to be compared in.
+        require_methods(config, (Kind.FLATTENER, Kind.RESTORER))
         require(config.trials <= N_BOARDS, "trials", f"be at most {N_BOARDS}, one a board", config.trials)
         refuse_sheets(config, "this experiment scans boards")
         path = config.real_boards.path
@@ -154,7 +156,7 @@ def _measure_board(
         for method in methods:
             with record.attempt("restored", method):
                 with record.stage("restore", "restored", method):
-                    restored = pipeline.restore(scan, method=method)
+                    restored = pipeline.restore(scan, method=method_of(config, method))
                 _measure_restored(record, method, scan.sheet, restored, seen)
                 if method == config.methods[0]:
                     name = f"board_{record.key.trial}"

@@ -13,11 +13,11 @@ import data_synth
 from data_synth import Checkerboard, Rig, TrueSheet
 from deskew import acquisition, flattening, pipeline, restoration
 from deskew.acquisition import DenoiseSettings, SweepSettings
+from deskew.errors import require
 from deskew.types import Calibration, Capture, Correspondence, DepthMap
 from experiments.reporting import Column, Layout, Times
 from experiments.settings import Config
 from experiments.studies import flattening_times
-from experiments.studies.methods import require_methods
 from experiments.studies.stopwatch import TRIAD, Stopwatch
 from experiments.studies.study import Study
 from experiments.studies.trial_sheets import refuse_sheets
@@ -103,7 +103,9 @@ class Speed(Study):
 
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial, whatever the number of repetitions: times are compared within one process only."""
-        require_methods(config)
+        built_in = set(config.methods) <= flattening.METHODS.keys()
+        allowed = f"be built-in ones, {', '.join(flattening.METHODS)}, since others are timed with their process"
+        require(built_in, "method", allowed, config.methods)
         refuse_sheets(config, "this experiment times on mirror folds")
         return [TrialKey(config.experiment, seed=config.seed)]
 

@@ -14,6 +14,7 @@ from data_synth import Case, Leaf, Truth, TwoMaterials, VellumPage
 from deskew import metrics, pipeline, restoration
 from deskew.errors import require
 from deskew.io import StiffnessMap, read_image
+from deskew.plugins import Kind
 from deskew.projection import pixel_grid
 from deskew.recipes import recipe_for
 from deskew.restoration import Registration
@@ -22,7 +23,7 @@ from experiments.reporting import Layout
 from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
-from experiments.studies.methods import require_methods
+from experiments.studies.methods import method_of, require_methods
 from experiments.studies.model_view import model_view
 from experiments.studies.recipes import calibration_mode, configured
 from experiments.studies.registered import map_error
@@ -67,7 +68,7 @@ class Stiffness(Study):
 
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial a case and sheet."""
-        require_methods(config)
+        require_methods(config, (Kind.FLATTENER,))
         require(config.page.kind == "vellum", "page.kind", "be vellum in this experiment", config.page.kind)
         if config.stiffness.materials != "texture":
             _read_leaf(config)
@@ -97,9 +98,9 @@ class Stiffness(Study):
             scan = pipeline.scan_by(recipe, capture, bench.calibration, shape=(config.mesh.rows, config.mesh.columns))
             scan = pipeline.with_shading_removed(scan, capture, bench.calibration)
             leaf = _leaf(config, scan, capture, bench)
-        trial = _Trial(record, two, truth, scan, leaf)
+        trial = _Trial(config, record, two, truth, scan, leaf)
         trial.measure_page(capture)
-        trial.restore_all(config)
+        trial.restore_all()
         with record.attempt(f"difference/{two.case}"):
             trial.measure_difference(trial.registered())
         return record.outcome()
@@ -125,6 +126,7 @@ def _read_leaf(config: Config) -> Mask:
 class _Trial:
     """One page and what is measured on it."""
 
+    config: Config
     record: Recorder
     two: TwoMaterials
     truth: Truth
@@ -149,10 +151,10 @@ class _Trial:
         sheet = self.scan.sheet
         self._picture("model", model_view(sheet.vertices if sheet.surface is None else sheet.surface))
 
-    def restore_all(self, config: Config) -> None:
+    def restore_all(self) -> None:
         """Restore with every ratio, then with what is right and what is beyond the paper; compare."""
-        first, *others = config.methods
-        ratios = config.stiffness.vellum_over_paper
+        first, *others = self.config.methods
+        ratios = self.config.stiffness.vellum_over_paper
         right, wrong = (min(ratios), max(ratios)) if self.case is Case.A else (max(ratios), min(ratios))
         errors = {ratio: self._restored(restored(self.case, ratio), first, ratio) for ratio in ratios}
         self._add_gains(restored(self.case, right), first, errors[right], errors[wrong], errors.get(1.0))
@@ -168,10 +170,12 @@ class _Trial:
         constants = {LEAF: min(ratio, 1.0), SLEEVE: min(1.0 / ratio, 1.0)}
         with self.record.attempt(condition, method):
             scan = pipeline.with_stiffness(self.scan, StiffnessMap(self.leaf.astype(np.uint8), constants))
-            settings: dict[str, Any] = {"rest": "section"} if method.startswith("paper_") else {}
+            function = method_of(self.config, method)
+            chords = isinstance(function, str) and function.startswith("paper_")
+            settings: dict[str, Any] = {"rest": "section"} if chords else {}
             settings |= {"free_scale": True} if free else {}
             with self.record.stage("restore", condition, method):
-                found = pipeline.restore(scan, method=method, **settings)
+                found = pipeline.restore(scan, method=function, **settings)
             flattened = found.flattened
             assert flattened is not None
             figures = self._errors(found) | flattening_figures(scan.sheet, flattened)

@@ -13,6 +13,7 @@ import data_synth
 from data_synth import Format, Layer, Light, Manuscript, Truth
 from deskew import metrics, pipeline, restoration
 from deskew.errors import require
+from deskew.plugins import Kind
 from deskew.restoration import Textures
 from deskew.types import Array, Pinhole, Scan, Size
 from experiments.reporting import Column, Layout, Montage, Plot
@@ -20,7 +21,7 @@ from experiments.settings import Config
 from experiments.studies.bench import Bench, calibrated_bench
 from experiments.studies.flattened import flattening_figures
 from experiments.studies.hidden_writing import Reader
-from experiments.studies.methods import require_methods
+from experiments.studies.methods import method_of, require_methods
 from experiments.studies.recipes import calibration_mode, methods_by_recipe
 from experiments.studies.registered import map_error
 from experiments.studies.study import Study
@@ -96,7 +97,7 @@ class TexturesStudy(Study):
 
     def plan(self, config: Config) -> list[TrialKey]:
         """Plan one trial a sheet."""
-        require_methods(config)
+        require_methods(config, (Kind.FLATTENER,))
         require(config.page.kind == "lettered", "page.kind", "be lettered in this experiment", config.page.kind)
         require_sheets(config)
         return Study.plan(self, config)
@@ -118,7 +119,7 @@ class TexturesStudy(Study):
             sheet = trial_sheet(config, key, rng, page.page_size_mm)
             lights = (*data_synth.standard_lights(), *_fine_lights(rng, bench.rig.camera.size))
             capture, truth = data_synth.render(bench.rig, sheet, page, rng, lights=lights)
-        trial = _Trial(record, page, truth, bench.calibration.camera)
+        trial = _Trial(config, record, page, truth, bench.calibration.camera)
         record.add("unrestored/white", "-", severity(sheet))
         for light in lights:
             if light.readout is not None:
@@ -155,6 +156,7 @@ def _fine_lights(rng: np.random.Generator, size: Size) -> tuple[Light, ...]:
 class _Trial:
     """One page and what is measured on its pictures."""
 
+    config: Config
     record: Recorder
     page: Manuscript
     truth: Truth
@@ -180,7 +182,7 @@ class _Trial:
     def measure_restored(self, scan: Scan, lights: list[str], method: str, *, shown: bool) -> None:
         """Restore all lights by one flattening, combine them, and read every picture."""
         with self.record.stage("restore", "restored", method):
-            restored = pipeline.restore_lights(scan, method=method, lights=lights)
+            restored = pipeline.restore_lights(scan, method=method_of(self.config, method), lights=lights)
         uv = self.truth.page_at(restored.backward_map.astype(np.float64))
         first = restored.restoration("white")
         figures = metrics.dense_error(first, uv, self.page.page_size_mm)

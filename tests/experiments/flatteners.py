@@ -9,8 +9,6 @@ import numpy as np
 
 from deskew.types import Array, Flattened, Floats, Sheet, Status
 
-NOISE_SEEN: list[float] = []
-
 
 def _unrolled(sheet: Sheet) -> Floats:
     x, y, z = sheet.vertices.T
@@ -19,8 +17,8 @@ def _unrolled(sheet: Sheet) -> Floats:
 
 def unroll(sheet: Sheet, **settings: Any) -> Flattened:
     radius = np.linalg.norm(sheet.vertices[:, [0, 2]], axis=1)
-    NOISE_SEEN.append(float(np.abs(radius - 25.0).max()))
-    return Flattened(_unrolled(sheet), Status.AT_REST, "", {"noise_estimated_mm": 0.25} | settings)
+    noise = float(np.abs(radius - 25.0).max())
+    return Flattened(_unrolled(sheet), Status.AT_REST, "", {"noise_estimated_mm": noise} | settings)
 
 
 def project(sheet: Sheet) -> Flattened:
