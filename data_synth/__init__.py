@@ -27,7 +27,7 @@ from data_synth.render import photograph, render
 from data_synth.rig import Rig, RigConfig, default_rig
 from data_synth.sheets import PAGE_SIZE_MM, TrueSheet, dome, flat_sheet, plane, posed, tent
 from data_synth.texts import N_LETTERS, Text, page_words
-from data_synth.truth import Truth
+from data_synth.truth import Truth, true_sheet_seen
 from data_synth.vellum import VellumPage
 
 __all__ = [
@@ -86,4 +86,5 @@ __all__ = [
     "shipped_two_materials",
     "standard_lights",
     "tent",
+    "true_sheet_seen",
 ]

@@ -23,6 +23,7 @@ STUDIES = {
     "integrators": "experiments.studies.integrators:Integrators",
     "settling": "experiments.studies.settling:Settling",
     "culling": "experiments.studies.culling:Culling",
+    "null_controls": "experiments.studies.null_controls:NullControls",
     "speed": "experiments.studies.speed:Speed",
 }
 

@@ -46,10 +46,7 @@ class PageReader:
 
     def cut(self, image: Array) -> Array:
         """Cut a picture (height, width) to the flat page's place."""
-        half = np.array(self.page.page_size_mm) / 2 - INSET_MM
-        corners = np.array([(-half[0], half[1], 0.0), (half[0], -half[1], 0.0)])
-        (left, top), (right, bottom) = np.rint(projection.project(self.view, corners)).astype(int)
-        return image[max(top, 0) : bottom, max(left, 0) : right]
+        return cut_to_page(image, self.view, self.page.page_size_mm)
 
     def placed(self, image: Array, true_uv: Floats | None) -> Array:
         """Bring a picture of the page alone, at any size, to where the flat page lies in the view.
@@ -99,6 +96,14 @@ class PageReader:
         side = np.full(pixels.size, 2 * _BLANK_MM)
         inside[pixels] = self.page.lettering.coverage(u[pixels], v[pixels], side, side) == 0.0
         return np.asarray(inside.reshape(true_uv.shape[:2]))
+
+
+def cut_to_page(image: Array, view: Pinhole, page_size_mm: tuple[float, float]) -> Array:
+    """Cut a picture (height, width), seen through an ideal camera, to the flat page's place less `INSET_MM`."""
+    half = np.array(page_size_mm) / 2 - INSET_MM
+    corners = np.array([(-half[0], half[1], 0.0), (half[0], -half[1], 0.0)])
+    (left, top), (right, bottom) = np.rint(projection.project(view, corners)).astype(int)
+    return image[max(top, 0) : bottom, max(left, 0) : right]
 
 
 def _counts(found: Misses) -> dict[str, float]:

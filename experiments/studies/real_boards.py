@@ -15,7 +15,7 @@ from deskew.acquisition import BoardView, DenoiseSettings, DepthSettings, InkSet
 from deskew.errors import InputError, require
 from deskew.plugins import Kind
 from deskew.recipes import Recipe
-from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Scan, Sheet
+from deskew.types import Array, Board, Calibration, Capture, DepthMap, Floats, Pinhole, Restoration, Scan, Sheet
 from experiments.reporting import Column, Layout, Montage
 from experiments.settings import Config
 from experiments.studies.bench import calibration_figures
@@ -58,7 +58,8 @@ class RealBoards(Study):
     `calibration`
         All five boards.
     `left_out`
-        The scan of the board that the calibration has not seen: lengths over 400 units, deviation from a plane.
+        The scan of the board that the calibration has not seen: lengths over 400 units, deviation from a plane, and the
+        share of its pixels that have depth, ink included.
     `restored`
         The restored board's corners against exact squares, a row of figures for each method.
     """
@@ -73,6 +74,7 @@ class RealBoards(Study):
             Column("calib_stereo_rms_px", "stereo RMS [px]", 3, headline=True),
             Column("length_error_units", "length error, RMS [units]", 3, headline=True, rms=True),
             Column("plane_mean_abs_units", "mean deviation from a plane [units]", 3, headline=True),
+            Column("depth_coverage", "coverage", 4, headline=True),
             Column("corner_rigid_mean_units", "restored corners, mean [units]", 3, headline=True),
             Column("corner_rigid_max_units", "restored corners, max [units]", 3, headline=True),
             Column("corners_missing", "missing", 0, headline=True),
@@ -141,7 +143,7 @@ def _measure_board(
     errors = acquisition.length_errors(points, acquisition.board_points(BOARD), _LENGTH_MIN)
     deviation = acquisition.plane_deviation(points[np.isfinite(points).all(axis=1)])
     figures = {"length_error_units": float(np.sqrt((errors**2).mean())), "plane_mean_abs_units": deviation.mean_abs_mm}
-    record.add("left_out", "-", figures)
+    record.add("left_out", "-", figures | {"depth_coverage": _covered(depth, seen)})
     R, t = _onto_bed(calibration.camera, points)
     record.add("left_out", "-", _as_rows(R, t))
     on_bed = replace(
@@ -202,6 +204,12 @@ def _border(corners: Floats) -> Floats:
     homography, _ = cv2.findHomography(grid, corners)
     rim = np.array([(-0.9, -0.9), (nx - 0.1, -0.9), (nx - 0.1, ny - 0.1), (-0.9, ny - 0.1)])
     return np.asarray(cv2.perspectiveTransform(rim.reshape(-1, 1, 2), homography)).reshape(4, 2)
+
+
+def _covered(depth: DepthMap, corners: Floats) -> float:
+    """Return the share of the board's pixels that have depth, its black squares included."""
+    board = cv2.fillConvexPoly(np.zeros(depth.z.shape, np.uint8), np.rint(_border(corners)).astype(np.int32), (1,))
+    return float(np.isfinite(depth.z[board > 0]).mean())
 
 
 def _onto_bed(camera: Pinhole, points: Floats) -> tuple[Floats, Floats]:

@@ -20,6 +20,8 @@ from deskew.errors import DeskewError, require
 from experiments.trials.schema import Failure, Row, TrialKey
 
 FAILED = "failed"
+SECONDS_TRIAL = "seconds_trial"
+"""The wall-clock time of a whole trial, what no stage times included."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +61,7 @@ class Recorder:
     """
 
     def __init__(self, key: TrialKey) -> None:
-        self.key = key
+        self.key, self._start = key, time.perf_counter()
         self._rows: dict[tuple[str, str, str], Row] = {}
         self._timings: dict[tuple[str, str, str], float] = {}
         self._failures: list[Failure] = []
@@ -120,9 +122,10 @@ class Recorder:
         self._failures.append(Failure(condition, method, self.key.trial, self.key.seed, reason))
 
     def outcome(self) -> Outcome:
-        """Return what was recorded, with the peak memory of the process during the trial."""
+        """Return what was recorded, with the time of the trial and the peak memory of its process."""
         timings = [Row.of(self.key, *place, value) for place, value in self._timings.items()]
-        timings.append(Row.of(self.key, self.key.condition, self.key.method, "peak_mb", max(self._peak_mb, _peak_mb())))
+        whole = {"peak_mb": max(self._peak_mb, _peak_mb()), SECONDS_TRIAL: time.perf_counter() - self._start}
+        timings += [Row.of(self.key, self.key.condition, self.key.method, *item) for item in whole.items()]
         rows = tuple(sorted(self._rows.values()))
         return Outcome(rows, tuple(sorted(timings)), tuple(sorted(self._failures)), dict(self._pictures))
 

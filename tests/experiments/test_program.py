@@ -272,7 +272,7 @@ def test_results_are_tidy_sorted_and_hold_no_times(program: Program, out: Path) 
     ]
     assert [line.rsplit(",", 1)[1] for line in lines[3:5]] == ["px", "1"]
     metrics = {line.split(",")[5] for line in (out / "timings.csv").read_text().splitlines()[1:]}
-    assert metrics == {"seconds_render", "seconds_prepare", "peak_mb"}
+    assert metrics == {"seconds_render", "seconds_prepare", "seconds_trial", "peak_mb"}
 
 
 @pytest.mark.parametrize(("budget", "trials"), [("smoke", 2), ("paper", 4), ("full", 6)])

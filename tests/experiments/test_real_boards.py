@@ -54,6 +54,7 @@ def test_rendered_boards_in_the_real_layout_are_measured_to_their_true_size(
     # Of lengths over 400 units, 128 mm: a thousandth would be 0.4.
     assert 0.0 < rows["left_out", "length_error_units"] < 0.8
     assert 0.0 < rows["left_out", "plane_mean_abs_units"] < 0.5
+    assert 0.5 < rows["left_out", "depth_coverage"] <= 1.0
     assert rows["restored", "corners_missing"] == 0
     assert 0.0 < rows["restored", "corner_rigid_mean_units"] < 3.0
     assert np.isfinite(rows["restored", "corner_rigid_max_units"])

@@ -1,0 +1,1 @@
+"""Pages that set one figure of the reports beside another: synthetic beside real, every metric beside its null."""
