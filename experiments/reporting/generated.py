@@ -20,12 +20,19 @@ from experiments.reporting.claims.page import claims_page
 from experiments.reporting.claims.paper import CLAIMS
 from experiments.reporting.croissant import croissant_text
 from experiments.reporting.readme import with_tables
+from experiments.reporting.scaling import Measured, with_figures
 
 ROOT = Path(__file__).resolve().parents[2]
+
+
+def _measured(root: Path) -> Measured:
+    return Measured.read(root / "docs/scaling.csv", root / "reports")
+
 
 GENERATED: Mapping[str, Callable[[Path], str]] = {
     "README.md": lambda root: with_tables((root / "README.md").read_text(), root / "reports"),
     "ARTIFACT.md": lambda root: with_artifact((root / "ARTIFACT.md").read_text(), root / "reports"),
+    "docs/scaling.md": lambda root: with_figures((root / "docs/scaling.md").read_text(), _measured(root)),
     "reports/CLAIMS.md": lambda root: claims_page(CLAIMS, Evidence(root / "reports")),
     "reports/NULLS.md": lambda root: nulls_page(Evidence(root / "reports")),
     "reports/SYNTHETIC_AND_REAL.md": lambda root: real_page(Evidence(root / "reports")),

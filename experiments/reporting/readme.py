@@ -1,8 +1,6 @@
 """The README's tables: copied from the reports, so that no figure in it is typed by hand.
 
-    python -m experiments.reporting.readme
-
-replaces what stands between `<!-- table NAME -->` and `<!-- end -->` by the summary of `reports/NAME/table.md`.
+What stands between `<!-- table NAME -->` and `<!-- end -->` is the summary of `reports/NAME/table.md`.
 """
 
 from __future__ import annotations
@@ -11,7 +9,6 @@ import re
 from pathlib import Path
 
 from deskew.errors import InputError
-from deskew.io import write_bytes
 
 _BLOCK = re.compile(r"(<!-- table (?P<name>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 _SUMMARY = re.compile(r"^## Summary\n\n(?P<text>.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)
@@ -41,14 +38,3 @@ def with_tables(text: str, reports: Path) -> str:
         return f"{block[1]}{summary['text'].strip()}\n{block[3]}"
 
     return _BLOCK.sub(filled, text)
-
-
-def main() -> None:
-    """Rewrite README.md in place."""
-    root = Path(__file__).resolve().parents[2]
-    readme = root / "README.md"
-    write_bytes(with_tables(readme.read_text(), root / "reports").encode(), readme)
-
-
-if __name__ == "__main__":
-    main()

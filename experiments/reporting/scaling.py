@@ -1,9 +1,7 @@
 """The tables of docs/scaling.md: reckoned from measurements, so that no figure in them is typed by hand.
 
-    python -m experiments.reporting.scaling
-
-replaces what stands between `<!-- NAME -->` and `<!-- end -->` by the table of that name below, from docs/scaling.csv,
-which ``python -m experiments.scaling`` measures, and of the reports' `timings.csv`.
+What stands between `<!-- NAME -->` and `<!-- end -->` is the table of that name below, of docs/scaling.csv, which
+``python -m experiments.scaling`` measures, and of the reports' `timings.csv`.
 """
 
 from __future__ import annotations
@@ -18,7 +16,6 @@ from pathlib import Path
 from statistics import fmean, median
 
 from deskew.errors import InputError
-from deskew.io import write_bytes
 
 _BLOCK = re.compile(r"(<!-- (?P<name>[a-z]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 _PATTERNS = {"line_sweep": "line sweep", "gray_code": "Gray code"}
@@ -184,15 +181,3 @@ def with_figures(text: str, measured: Measured) -> str:
         return block[1] + "".join(f"| {' | '.join(cells)} |\n" for cells in lines) + block[3]
 
     return _BLOCK.sub(filled, text)
-
-
-def main() -> None:
-    """Rewrite docs/scaling.md in place."""
-    root = Path(__file__).resolve().parents[2]
-    document = root / "docs" / "scaling.md"
-    measured = Measured.read(root / "docs" / "scaling.csv", root / "reports")
-    write_bytes(with_figures(document.read_text(), measured).encode(), document)
-
-
-if __name__ == "__main__":
-    main()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 if __name__ == "__main__":
@@ -10,6 +11,8 @@ if __name__ == "__main__":
     from experiments.trials import plan
     from tests.experiments import conftest
 
+    # Started in the background, as some CI is, the tests hand down that ctrl-C is ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     conftest.register_fake()
     plan.SOURCES = conftest.SOURCES
     sys.exit(main(["experiment=fake", *sys.argv[1:]]))
