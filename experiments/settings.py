@@ -11,12 +11,14 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from math import isfinite
 from typing import Any, ClassVar
 
-from omegaconf import MISSING
+from omegaconf import MISSING, OmegaConf
 
 from deskew.errors import InputError, require
 
 BUDGETS = ("smoke", "paper", "full")
 ENGINES = ("processes", "ray", "serial", "slurm")
+# `${at:${budget.name},A,B,C}` in conf/: what depends on the budget, as `trials` does.
+OmegaConf.register_new_resolver("at", lambda budget, *values: values[BUDGETS.index(budget)], replace=True)
 SURFACE_KINDS = ("cylinder", "cone", "folds", "mirror", "physical")
 
 

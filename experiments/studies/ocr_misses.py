@@ -83,7 +83,7 @@ class OcrMisses(Study):
     layout: ClassVar[Layout] = LAYOUT
 
     def plan(self, config: Config) -> list[TrialKey]:
-        """Plan a trial a page, one a page and further severity (at `smoke` a single one), and one a real document."""
+        """Plan a trial a page, one a page and further severity, and one a real document."""
         require_methods(config)
         require(config.page.kind == "lettered", "page.kind", "be lettered in this experiment", config.page.kind)
         require_sheets(config)
@@ -94,7 +94,7 @@ class OcrMisses(Study):
         require(known, "ocr.severities", "leave out sheet.slope_p90_deg, which is read anyway", severities)
         _engine(config)
         keys = trial_keys(config)
-        for slope in severities[:1] if config.budget.name == "smoke" else severities:
+        for slope in severities:
             keys += trial_keys(config, f"{_SWEEP}{slope:g}")
         real = [] if config.ocr.real_path is None else documents(Path(config.ocr.real_path))
         return keys + [TrialKey(config.experiment, _REAL, "-", i, config.seed) for i in range(len(real))]

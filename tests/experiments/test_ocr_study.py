@@ -15,10 +15,11 @@ import pytest
 import data_synth
 from data_synth.lettering import set_words
 from deskew import metrics
+from deskew.errors import InputError
 from deskew.metrics import ocr
 from deskew.types import Calibration
 from experiments.program import main
-from experiments.settings import BudgetSettings, Config, PageSettings, ReadingSettings
+from experiments.settings import Config
 from experiments.studies import ocr_misses
 from experiments.studies.bench import Bench
 
@@ -55,13 +56,22 @@ def photographs(tmp_path: Path) -> Path:
     return folder.parent
 
 
-@pytest.mark.parametrize(("budget", "n"), [("smoke", 1), ("paper", 2), ("full", 2)])
-def test_smoke_reads_one_further_severity(budget: str, n: int) -> None:
-    size, page = BudgetSettings(budget), PageSettings("lettered")
-    reading = ReadingSettings(severities=[30.0, 40.0])
-    config = Config("ocr_misses", trials=2, method="spring", budget=size, page=page, ocr=reading)
-    conditions = [key.condition for key in ocr_misses.OcrMisses().plan(config)]
-    assert conditions == ["-"] * 2 + [f"slope={slope}" for slope in (30, 40)[:n] for _ in range(2)]
+@pytest.mark.parametrize(
+    ("given", "slopes"),
+    [(["budget=smoke"], [30]), ([], [30, 44]), (["budget=full"], [20, 30, 36, 44]), (["ocr.severities=[35]"], [35])],
+)
+def test_a_budget_has_its_severities_unless_others_are_given(
+    monkeypatch: pytest.MonkeyPatch, given: list[str], slopes: list[int]
+) -> None:
+    planned: list[Config] = []
+
+    def refuse(config: Config) -> None:
+        planned.append(config)
+        raise InputError("`nothing` must be run.")
+
+    monkeypatch.setattr(ocr_misses, "require_methods", refuse)
+    assert main(["experiment=ocr_misses", *given]) == 2
+    assert planned[0].ocr.severities == slopes
 
 
 @pytest.fixture
