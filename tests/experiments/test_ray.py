@@ -43,8 +43,22 @@ class Cluster:
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     log = tmp_path_factory.mktemp("ray") / "log"
+    # Ray gives a node half a minute to start, which a busy machine may need more than once.
+    for _ in range(3):
+        nodes = _nodes(log)
+        assert nodes.stdout is not None
+        words = nodes.stdout.readline().split()
+        if words:
+            break
+        _end(nodes)
+    assert len(words) == 2, log.with_name("messages").read_text()
+    yield Cluster(words[0], int(words[1]), nodes.pid, log)
+    _end(nodes)
+
+
+def _nodes(log: Path) -> subprocess.Popen[str]:
     with log.with_name("messages").open("wb") as messages:
-        nodes = subprocess.Popen(
+        return subprocess.Popen(
             [sys.executable, "-m", "tests.experiments.ray_nodes"],
             cwd=ROOT,
             env={**os.environ, **VARIABLES, "FAKE_LOG": str(log)},
@@ -54,10 +68,9 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
             stderr=messages,
             text=True,
         )
-    assert nodes.stdout is not None
-    words = nodes.stdout.readline().split()
-    assert len(words) == 2, log.with_name("messages").read_text()
-    yield Cluster(words[0], int(words[1]), nodes.pid, log)
+
+
+def _end(nodes: subprocess.Popen[str]) -> None:
     nodes.communicate(timeout=60)
     for process in processes_of(nodes.pid):
         os.kill(process, signal.SIGKILL)

@@ -90,7 +90,7 @@ assert block.sum() == 25_000_000
 del block
 with record.memory("small"):
     pass
-found = {row.condition: row.value for row in record.outcome().timings}
+found = {row.condition: row.value for row in record.outcome().timings if row.metric == "peak_mb"}
 print(found["large"], found["small"], found["-"])
 """
 
