@@ -17,6 +17,8 @@ IMAGE_SUFFIXES = (".png", ".tif", ".tiff")
 MAX_DECODED_BYTES = 1 << 29
 """Largest picture that is decoded: 178 megapixels of 8-bit colour."""
 
+_ROWS = 64
+
 
 def _header(data: bytes, path: Path) -> tiff.Header:
     read = png.header if path.suffix.lower() == ".png" else tiff.header
@@ -83,11 +85,11 @@ def read_raster(path: Path, size: Size | None = None) -> Array:
     image = _decode(data, path)
     found = (image.shape[1], image.shape[0])
     require(found == declared, str(path), f"decode to {declared} px as its header says", f"{found} px")
-    if image.ndim == 3 and image.shape[2] == 4:
-        image = cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA)
-    elif image.ndim == 3 and image.shape[2] == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
-    return np.asarray(image)
+    if image.ndim == 3 and image.shape[2] in (3, 4):
+        # In place, since a large picture need not be held twice, and by numpy, which knows every sample type.
+        for rows in range(0, len(image), _ROWS):
+            image[rows : rows + _ROWS, :, :3] = image[rows : rows + _ROWS, :, 2::-1].copy()
+    return image
 
 
 def read_image(path: Path, size: Size | None = None) -> Array:
@@ -108,8 +110,8 @@ def read_image(path: Path, size: Size | None = None) -> Array:
     image = read_raster(path, size)
     require(image.dtype in (np.uint8, np.uint16), str(path), "have 8 or 16 bits a sample", image.dtype)
     if image.ndim == 3 and image.shape[2] == 4:
-        opaque = bool((image[..., 3] == np.iinfo(image.dtype).max).all())
-        require(opaque, str(path), "be without transparency", f"an alpha down to {image[..., 3].min()}")
+        least = int(image[..., 3].min())
+        require(least == np.iinfo(image.dtype).max, str(path), "be without transparency", f"an alpha down to {least}")
         image = np.ascontiguousarray(image[..., :3])
     grey_or_colour = image.ndim == 2 or image.shape[2] == 3
     require(grey_or_colour, str(path), "have 1 or 3 channels", image.shape[2:])
