@@ -14,8 +14,12 @@ from deskew.types import Array, Size
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff")
 
-MAX_DECODED_BYTES = 1 << 29
-"""Largest picture that is decoded: 178 megapixels of 8-bit colour."""
+MAX_DECODED_BYTES = 3 << 27
+"""Largest picture that is decoded, 134 megapixels of 8-bit colour: what is wrong is said within 1 GB of memory."""
+
+_PACKED_MAX = (
+    1 << 13
+)  # decoded over stored bytes; LZW and Deflate reach some 1400, and a decoded grey counts four times
 
 _ROWS = 64
 
@@ -27,6 +31,13 @@ def _header(data: bytes, path: Path) -> tiff.Header:
     size = f"{found.size[0]}x{found.size[1]} px"
     require(small, str(path), f"decode to at most {MAX_DECODED_BYTES} bytes", f"{size}, {found.decoded_bytes} bytes")
     return found
+
+
+def _require_pixels(found: tiff.Header, data: bytes, path: Path) -> None:
+    """Refuse a TIFF too short for what it declares: its decoder would leave the rest black, and say nothing."""
+    room = found.decoded_bytes <= _PACKED_MAX * len(data)
+    size = f"{found.size[0]}x{found.size[1]} px"
+    require(room, str(path), f"hold the {size} that it declares", f"{len(data)} bytes")
 
 
 def _decode(data: bytes, path: Path) -> Array:
@@ -79,7 +90,10 @@ def read_raster(path: Path, size: Size | None = None) -> Array:
     suffix = path.suffix.lower()
     require(suffix in IMAGE_SUFFIXES, str(path), f"end in {' or '.join(IMAGE_SUFFIXES)}", suffix or "no suffix")
     data = read_bytes(path)
-    declared = _header(data, path).size
+    header = _header(data, path)
+    if suffix != ".png":
+        _require_pixels(header, data, path)
+    declared = header.size
     if size is not None:
         require(declared == size, str(path), f"be {size[0]}x{size[1]} px", f"{declared[0]}x{declared[1]} px")
     image = _decode(data, path)
