@@ -10,6 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 
@@ -20,11 +21,9 @@ from deskew.types import Array
 MAX_ARRAY_BYTES = 3 << 28
 """Largest file, and largest sum of arrays that it may unpack to: what is wrong is said within 1 GB of memory."""
 
-_DAMAGE = (
-    *(ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error),
-    # numpy parses an array's header as a literal of Python's, and on failure once more as one of Python 2's.
-    *(SyntaxError, tokenize.TokenError, TypeError, KeyError, MemoryError, OverflowError),
-)
+# numpy parses a header as a literal of Python's, and on failure once more as one of Python 2's.
+_NO_HEADER = (ValueError, SyntaxError, tokenize.TokenError, TypeError, KeyError, MemoryError, RecursionError)
+_DAMAGE = (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
 def write_arrays(arrays: Mapping[str, Array], path: Path) -> None:
@@ -46,11 +45,19 @@ def write_arrays(arrays: Mapping[str, Array], path: Path) -> None:
     write_bytes(stream.getvalue(), path)
 
 
-def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, name: str) -> Array:
-    with archive.open(entry) as stream:
+def _header(stream: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    try:
         version = np.lib.format.read_magic(stream)
         reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, dtype = reader(stream)
+    except _NO_HEADER as error:
+        raise InputError(f"`{name}` must begin with the header of an array, got damage.") from error
+    return shape, dtype
+
+
+def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, name: str) -> Array:
+    with archive.open(entry) as stream:
+        shape, dtype = _header(stream, name)
         n_bytes = math.prod(shape) * dtype.itemsize
         require(dtype.kind in "fiub", name, "hold numbers", shown(dtype.str))
         # The header alone decides how much memory numpy asks for: it has to agree with what is really there.

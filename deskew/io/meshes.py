@@ -99,6 +99,9 @@ def _ply(data: bytes) -> Mesh:
 
     require(data.startswith(b"ply"), "mesh", "begin with the word ply", shown(data[:8]))
     header = data.partition(b"end_header")[0]
+    require(len(header) < len(data), "mesh", "have a whole PLY header", "no end_header")
+    known = re.search(rb"^format\s+(ascii|binary_little_endian|binary_big_endian)\s", header, re.MULTILINE)
+    require(known is not None, "format", "be ascii, binary_little_endian or binary_big_endian", "another or none")
     properties = set(re.findall(rb"^property\s+\w+\s+(\w+)\s*$", header, re.MULTILINE))
     require(properties >= {b"x", b"y", b"z"}, "vertices", "have the properties x, y and z", "others")
     # fix_texture would split vertices at seams; no resolver is given, so that no file named inside is opened.

@@ -25,6 +25,7 @@ _NONE = -1  # no texture coordinate yet
 
 
 def _index(word: str, n: int) -> int:
+    require(len(word) <= 20, "index", f"be in [1, {n}]", shown(word))  # before it is made a number
     index = int(word)
     index = index - 1 if index > 0 else n + index  # OBJ counts from 1, or backwards from the end
     require(0 <= index < n, "index", f"be in [1, {n}]", word)

@@ -61,8 +61,8 @@ ARCHIVES = (
     archive("an NPZ that is a PNG", b"\x89PNG\r\n\x1a\n" + bytes(99), "whole NPZ"),
     archive("a bare pickle named .npz", pickle.dumps(Opened()), "whole NPZ"),
     archive("an NPZ without arrays", npz({}), "hold the arrays"),
-    archive("an NPZ of a text", npz({"version.npy": b"hello"}), "whole NPZ"),
-    archive("an NPZ of a pickle", npz({"version.npy": pickle.dumps(Opened())}), "whole NPZ"),
+    archive("an NPZ of a text", npz({"version.npy": b"hello"}), "header of an array"),
+    archive("an NPZ of a pickle", npz({"version.npy": pickle.dumps(Opened())}), "header of an array"),
     archive(
         "an array of objects by its header", npz({"a.npy": npy("'|O'", "(1,)", pickle.dumps(Opened()))}), "hold numbers"
     ),
@@ -81,13 +81,13 @@ ARCHIVES = (
     archive(
         "a header that is code",
         npz({"a.npy": npy("__import__('os').system('touch RUN')", "(1,)", bytes(8))}),
-        "whole NPZ",
+        "header of an array",
     ),
-    archive("a header that never closes", npz({"a.npy": npy("'''", "(1,)", bytes(8))}), "whole NPZ"),
-    archive("a header of brackets 3000 deep", npz({"a.npy": npy("[" * 3000, "(1,)", bytes(8))}), "whole NPZ"),
-    archive("a header with a NUL", npz({"a.npy": npy("'\0'", "(1,)", bytes(8))}), "whole NPZ"),
-    archive("an array of a version unknown", npz({"a.npy": b"\x93NUMPY\x09\x00" + bytes(99)}), "whole NPZ"),
-    archive("an array cut in its first word", npz({"a.npy": b"\x93NUMPY"}), "whole NPZ"),
+    archive("a header that never closes", npz({"a.npy": npy("'''", "(1,)", bytes(8))}), "header of an array"),
+    archive("a header of brackets 3000 deep", npz({"a.npy": npy("[" * 3000, "(1,)", bytes(8))}), "header of an array"),
+    archive("a header with a NUL", npz({"a.npy": npy("'\0'", "(1,)", bytes(8))}), "header of an array"),
+    archive("an array of a version unknown", npz({"a.npy": b"\x93NUMPY\x09\x00" + bytes(99)}), "header of an array"),
+    archive("an array cut in its first word", npz({"a.npy": b"\x93NUMPY"}), "header of an array"),
     Case("an NPZ of objects", RESTORE, ("scan.npz", "hold numbers", "|O"), _objects),
     Case("an NPZ with a name twice", RESTORE, ("`scan.npz`", "name each array once"), _twice),
     Case(

@@ -136,8 +136,8 @@ class Tally:
         Damaged inputs, and how many of them were read all the same.
     failures : Counter of str
         Anything but the project's own error, by its kind and place; `hung` among them.
-    seconds_max : float
-        Longest single run [s].
+    seconds_max, seconds_cpu : float
+        Longest single run by the clock, and time of the processor that all of them took [s].
     peak_mb : float
         Of the process [MB].
     """
@@ -146,6 +146,7 @@ class Tally:
     n_read: int = 0
     failures: Counter[str] = field(default_factory=Counter)
     seconds_max: float = 0.0
+    seconds_cpu: float = 0.0
     peak_mb: float = 0.0
 
 
@@ -155,7 +156,7 @@ def _ring(_: int, __: FrameType | None) -> None:
 
 def fuzz(reader: Reader, seed: int, *, seconds: float = float("inf"), n_runs: int | None = None) -> Tally:
     """Damage a reader's files and read them, for so long or so often."""
-    rng, tally = Random(f"{reader.name} {seed}"), Tally()
+    rng, tally, used = Random(f"{reader.name} {seed}"), Tally(), time.process_time()
     before = signal.signal(signal.SIGPROF, _ring)
     folder = Path(tempfile.mkdtemp(prefix=f"fuzz.{reader.name}."))
     try:
@@ -173,6 +174,7 @@ def fuzz(reader: Reader, seed: int, *, seconds: float = float("inf"), n_runs: in
     finally:
         signal.signal(signal.SIGPROF, before)
     shutil.rmtree(folder)
+    tally.seconds_cpu = time.process_time() - used
     tally.peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     return tally
 
@@ -229,7 +231,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         tally = fuzz(READERS[name], chosen.seed, seconds=chosen.seconds)
         failed = ", ".join(f"{count} x {what}" for what, count in tally.failures.items()) or "no failure"
         print(
-            f"{name}: {tally.n_runs} runs, {tally.n_read} read, longest {tally.seconds_max:.2f} s, "
+            f"{name}: {tally.n_runs} runs, {tally.n_read} read, {tally.seconds_cpu:.0f} s of the processor, longest {tally.seconds_max:.2f} s, "
             f"peak {tally.peak_mb:.0f} MB, {failed}",
             flush=True,
         )

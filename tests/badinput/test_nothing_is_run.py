@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = sorted(path for package in ("deskew", "data_synth", "experiments") for path in (ROOT / package).rglob("*.py"))
-# Between this program's own processes, over files and memory that it has written itself in the very same run.
+# Work for this program's own processes, which it has written itself in the very same run.
 OWN_PICKLES = {"experiments/trials/engines/ray.py", "experiments/trials/engines/slurm.py"}
 
 UNPICKLING = {

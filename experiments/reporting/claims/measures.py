@@ -82,9 +82,10 @@ def _read(path: Path) -> Mapping[tuple[str, str, str], Trials]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
+                if None in row.values():
+                    raise ValueError("a line cut short")
                 table[row["condition"], row["method"], row["metric"]][int(row["trial"])] = float(row["value"])
-    # A line that is too short has None for its missing cells.
-    except (OSError, ValueError, TypeError, KeyError, csv.Error) as error:
+    except (OSError, ValueError, KeyError, csv.Error) as error:
         raise InputError(f"`{path}` must be a results.csv or timings.csv, got {in_one_line(error)}.") from error
     return table
 
