@@ -231,8 +231,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         tally = fuzz(READERS[name], chosen.seed, seconds=chosen.seconds)
         failed = ", ".join(f"{count} x {what}" for what, count in tally.failures.items()) or "no failure"
         print(
-            f"{name}: {tally.n_runs} runs, {tally.n_read} read, {tally.seconds_cpu:.0f} s of the processor, longest {tally.seconds_max:.2f} s, "
-            f"peak {tally.peak_mb:.0f} MB, {failed}",
+            f"{name}: {tally.n_runs} runs, {tally.n_read} read, {tally.seconds_cpu:.0f} s of the processor, "
+            f"longest {tally.seconds_max:.2f} s, peak {tally.peak_mb:.0f} MB, {failed}",
             flush=True,
         )
         n_failed += bool(tally.failures)
