@@ -63,7 +63,12 @@ def _named(key: Sequence[object]) -> str:
 def _table(path: Path) -> pd.Series[float]:
     try:
         # Not by its path: pandas would wait for a pipe, and fetch what looks like an address.
-        values = pd.read_csv(BytesIO(read_bytes(path)), keep_default_na=False).set_index(_KEY)["value"].astype(float)
+        texts = dict.fromkeys(("experiment", "condition", "method", "metric", "unit"), str)
+        values = (
+            pd.read_csv(BytesIO(read_bytes(path)), keep_default_na=False, dtype=texts)
+            .set_index(_KEY)["value"]
+            .astype(float)
+        )
         if not values.index.is_unique:
             raise ValueError("a row twice")
         return values

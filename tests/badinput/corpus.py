@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import stat
@@ -15,17 +14,17 @@ from tests.badinput.case import Case
 MEGABYTES_MAX = 1024.0
 
 
-def listing(folder: Path) -> dict[str, str]:
-    """Every path under a folder with its kind and content; what is no plain file or folder by its kind alone."""
-    found = {}
-    for path in sorted(folder.rglob("*")):
-        mode = path.lstat().st_mode
-        content = f"{stat.S_IFMT(mode):o}"
-        if stat.S_ISREG(mode) and path.stat().st_size < 1 << 22:
-            content += hashlib.sha256(path.read_bytes()).hexdigest()
-        elif stat.S_ISREG(mode):
-            content += str(path.stat().st_size)
-        found[str(path.relative_to(folder))] = content
+Entry = tuple[int, ...]
+
+
+def listing(folder: Path) -> dict[str, Entry]:
+    """Every path under a folder with its kind; of what is no folder also size, place on the disk and last change."""
+    found: dict[str, Entry] = {}
+    for path in folder.rglob("*"):
+        seen = path.lstat()
+        # Something that came and went has changed its folder's own time.
+        content = () if stat.S_ISDIR(seen.st_mode) else (seen.st_size, seen.st_ino, seen.st_mtime_ns)
+        found[str(path.relative_to(folder))] = (seen.st_mode, *content)
     return found
 
 
@@ -42,11 +41,13 @@ class Bench:
 
     def __init__(self, samples: Path, folder: Path) -> None:
         shutil.copytree(samples, folder)
-        self.samples, self.folder, self._whole = samples, folder, listing(samples)
+        self.samples, self.folder, self._whole = samples, folder, listing(folder)
 
     def mend(self) -> None:
         """Make every top-level entry that is not as it was anew."""
         changed = listing(self.folder).items() ^ self._whole.items()
+        if not changed:
+            return
         for name in {Path(path).parts[0] for path, _ in changed}:
             here, whole = self.folder / name, self.samples / name
             if here.is_dir() and not here.is_symlink():
@@ -57,6 +58,7 @@ class Bench:
                 shutil.copytree(whole, here)
             elif whole.exists():
                 shutil.copy(whole, here)
+        self._whole = listing(self.folder)
 
 
 def asked(server: subprocess.Popen[str], case: Case, folder: Path) -> dict[str, Any]:
@@ -76,7 +78,7 @@ def asked(server: subprocess.Popen[str], case: Case, folder: Path) -> dict[str, 
     return answer
 
 
-def faults(case: Case, answer: dict[str, Any], before: dict[str, str], after: dict[str, str]) -> list[str]:
+def faults(case: Case, answer: dict[str, Any], before: dict[str, Entry], after: dict[str, Entry]) -> list[str]:
     """Name what is wrong with how a case ended; nothing if it ended as it has to."""
     lines = answer["err"].splitlines()
     wrong = {

@@ -6,7 +6,7 @@ import pytest
 
 from tests.badinput.fuzz import READERS, fuzz
 
-N_RUNS = 150
+N_RUNS = 100
 
 
 @pytest.mark.parametrize("name", READERS)

@@ -48,9 +48,11 @@ def unsafe(source: str, own_pickles: bool = False) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=[str(path.relative_to(ROOT)) for path in SOURCES])
-def test_no_source_runs_what_a_file_says(path: Path) -> None:
-    assert unsafe(path.read_text(), str(path.relative_to(ROOT)) in OWN_PICKLES) == []
+def test_no_source_runs_what_a_file_says() -> None:
+    assert len(SOURCES) > 200
+    names = {path: str(path.relative_to(ROOT)) for path in SOURCES}
+    found = {name: unsafe(path.read_text(), name in OWN_PICKLES) for path, name in names.items()}
+    assert {name: lines for name, lines in found.items() if lines} == {}
 
 
 @pytest.mark.parametrize(
