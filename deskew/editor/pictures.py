@@ -65,7 +65,7 @@ def limit_of(values: Floats, least: float) -> float:
     finite = np.abs(values[np.isfinite(values)])
     most = max(least, float(np.percentile(finite, 98)) if finite.size else 0.0)
     step = 10.0 ** math.floor(math.log10(most))
-    return float(next(n * step for n in (1, 2, 5, 10) if n * step >= most * (1 - 1e-9)))
+    return float(next(n * step for n in (1, 1.5, 2, 3, 4, 5, 6, 8, 10) if n * step >= most * (1 - 1e-9)))
 
 
 def diverging(values: Floats, limit: float) -> Rgba:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from deskew import flattening, metrics, pipeline, projection, restoration
-from deskew.editor.pictures import eight_bits, grey
+from deskew.editor.pictures import eight_bits, grey, shrunk
 from deskew.errors import StepError
 from deskew.io import StiffnessMap
 from deskew.restoration import UNSHADED, Registration
@@ -93,8 +93,8 @@ class Preview:
 
     def __init__(self, scan: Scan) -> None:
         self.scan = scan
-        self.scale = min(1.0, LONGEST / max(scan.camera.size))
-        self._crop = _crop(scan, self.scale)
+        self._small = _shrunk(scan)
+        self._crop = _crop(self._small)
         self._now: _Solved | None = None
         self._last: _Solved | None = None
         self._registrations: dict[str, Registration] | None = None
@@ -149,12 +149,12 @@ class Preview:
     def _view(self, solved: _Solved, light: str) -> tuple[Array, Mask]:
         """Restore one light at the view's size; where lights of another format show the page is found once."""
         if light not in solved.views:
-            images = self.scan.images
+            images = self._small.images
             if self._registrations is None and images[light].shape[:2] != images[WHITE].shape[:2]:
                 self._registrations = restoration.register_textures(images, images.get(UNSHADED, images[WHITE]))
-            scan = replace(self.scan, sheet=solved.sheet)
+            scan = replace(self._small, sheet=solved.sheet)
             known = self._registrations or {}
-            textures = restoration.restore_textures(scan, solved.flat, [light], self.scale, known)
+            textures = restoration.restore_textures(scan, solved.flat, [light], registrations=known)
             solved.views[light] = (
                 np.ascontiguousarray(textures.images[light][self._crop]),
                 np.isfinite(textures.backward_map[self._crop][..., 0]),
@@ -163,7 +163,7 @@ class Preview:
 
     def _spread(self, solved: _Solved, page: Mask) -> Floats:
         """Give each pixel of the view the strain of the quad that it lies in."""
-        view = restoration.view_camera(self.scan.camera, self.scale)
+        view = restoration.view_camera(self._small.camera)
         origin = [part.start for part in self._crop[::-1]]
         corners = np.round((projection.project(view, solved.flat.vertices) - origin) * 16).astype(np.int32)
         shown = np.full(page.shape, np.nan, np.float32)
@@ -174,9 +174,21 @@ class Preview:
         return shown.astype(np.float64)
 
 
-def _crop(scan: Scan, scale: float) -> tuple[slice, slice]:
+def _shrunk(scan: Scan) -> Scan:
+    """Photograph the page with a camera of as many pixels as are shown, through the same lens."""
+    images = {light: shrunk(image, LONGEST) for light, image in scan.images.items()}
+    size = images[WHITE].shape[1], images[WHITE].shape[0]
+    K = scan.camera.K.copy()
+    for axis in (0, 1):
+        share = size[axis] / scan.camera.size[axis]
+        K[axis] *= share
+        K[axis, 2] += (share - 1.0) / 2  # the first pixel's centre is the origin, whatever its width
+    return replace(scan, images=images, camera=replace(scan.camera, size=size, K=K))
+
+
+def _crop(scan: Scan) -> tuple[slice, slice]:
     """Rows and columns of the view round the page, wide enough for what unfolding adds to it."""
-    view = restoration.view_camera(scan.camera, scale)
+    view = restoration.view_camera(scan.camera)
     places = projection.project(view, scan.sheet.vertices).reshape(-1, 2)
     low, high = places.min(axis=0), places.max(axis=0)
     room = _ROOM * (high - low).max()

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from deskew.editor.pictures import shrunk
 from deskew.errors import require
 from deskew.types import Array, Floats
 
@@ -20,6 +21,7 @@ MAX_POINTS = 20_000
 _SHIFT = 4  # OpenCV draws at sixteenths of a pixel
 # Share of the picture's diagonal: grain finer than the first is not colour, and gaps narrower than the second are ink.
 _GRAIN, _INK = 0.002, 0.012
+_FLOODED = 1800  # longer side of the picture that is flooded [px]; no colour needs more
 _HOLE = 0.1  # share of a region's area below which what it surrounds belongs to it
 
 
@@ -102,16 +104,20 @@ def _alike(picture: Array, place: Floats, tolerance: float) -> npt.NDArray[np.ui
     height, width = picture.shape[:2]
     x, y = (round(float(value)) for value in place)
     require(0 <= x < width and 0 <= y < height, "points", f"lie on the photograph of {width}x{height} px", f"{x}, {y}")
-    diagonal = float(np.hypot(height, width))
+    picture = shrunk(picture, _FLOODED)
+    share = picture.shape[1] / width
+    x, y = (min(int((n + 0.5) * share), most - 1) for n, most in zip((x, y), picture.shape[1::-1], strict=True))
+    diagonal = float(np.hypot(*picture.shape[:2]))
     # Closing first: ink is dark and narrow, and must neither be the colour that is picked nor stop the flood.
     ink = _disc(_INK * diagonal)
     bare = cv2.morphologyEx(cv2.medianBlur(picture, 2 * round(_GRAIN * diagonal) + 1), cv2.MORPH_CLOSE, ink)
-    flooded = np.zeros((height + 2, width + 2), np.uint8)
+    flooded = np.zeros((picture.shape[0] + 2, picture.shape[1] + 2), np.uint8)
     channels = 1 if picture.ndim == 2 else picture.shape[2]
     slack = (tolerance,) * channels
     flags = 4 | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE | 1 << 8
     cv2.floodFill(bare, flooded, (x, y), (0,) * channels, slack, slack, flags)
-    return _without_holes(np.asarray(cv2.morphologyEx(flooded[1:-1, 1:-1], cv2.MORPH_CLOSE, ink), np.uint8))
+    region = _without_holes(np.asarray(cv2.morphologyEx(flooded[1:-1, 1:-1], cv2.MORPH_CLOSE, ink), np.uint8))
+    return np.asarray(cv2.resize(region, (width, height), interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
 def _without_holes(region: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:

@@ -103,7 +103,7 @@ class Window:
         return self.page.locator("main.bench")
 
     def opened(self, editor: Editor) -> None:
-        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None)
+        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         own = (editor.origin, editor.origin.replace("http", "ws"), "data:", "blob:")
 

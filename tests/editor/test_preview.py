@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from deskew import metrics, pipeline
-from deskew.editor.preview import Preview
+from deskew.editor.preview import LONGEST, Preview
 from deskew.errors import InputError, StepError
 from deskew.io import StiffnessMap
 from deskew.types import Flattened, Scan, Status
@@ -118,3 +119,38 @@ def test_strain_shown_is_that_of_the_quads(scan: Scan) -> None:
     shown = preview.look("white").strain
     assert np.isin(shown[np.isfinite(shown)].astype(np.float32), strain.astype(np.float32)).all()
     assert np.nanmean(shown) == pytest.approx(strain.mean(), abs=5e-4)
+
+
+def test_a_large_photograph_is_shown_as_a_small_one_is(scan: Scan) -> None:
+    """Half a pixel of the large one would be seen: the camera that shows it looks through the same lens."""
+    small, white = scan.camera, scan.images["white"]
+    n, size = 3, (3 * small.size[0], 3 * small.size[1])
+    K = small.K.copy()
+    K[:2] *= n
+    K[:2, 2] += (n - 1) / 2
+    large = replace(
+        scan, images={"white": np.kron(white, np.ones((n, n), np.uint8))}, camera=replace(small, size=size, K=K)
+    )
+    preview, as_small = Preview(large), Preview(scan)
+    labels = np.zeros(size[::-1], np.uint8)
+    labels[n * LEAF[0].start : n * LEAF[0].stop, n * LEAF[1].start : n * LEAF[1].stop] = 1
+    preview.solve(StiffnessMap(labels, {0: 30.0, 1: 3.0}))
+    as_small.solve(two(scan, 3.0))
+    look, wanted = preview.look("white"), as_small.look("white").image
+    assert max(look.image.shape) <= LONGEST
+    found = cv2.resize(look.image, wanted.shape[::-1], interpolation=cv2.INTER_AREA).astype(float)
+    inside = (slice(60, -60), slice(60, -60))
+    offset, _ = cv2.phaseCorrelate(wanted[inside].astype(float), found[inside])
+    assert np.hypot(*offset) < 0.1
+    assert np.abs(found - wanted)[inside].mean() < 4
+
+
+def test_a_light_of_another_format_is_shown_pixel_on_pixel(scan: Scan) -> None:
+    finer = cv2.resize(scan.images["white"], None, fx=1.7, fy=1.7, interpolation=cv2.INTER_CUBIC)
+    preview = Preview(replace(scan, images={**scan.images, "photograph": finer}))
+    preview.solve(two(scan, 3.0))
+    white, other = (preview.look(light).image.astype(float) for light in ("white", "photograph"))
+    inside = (slice(60, -60), slice(60, -60))
+    offset, _ = cv2.phaseCorrelate(white[inside], other[inside])
+    assert np.hypot(*offset) < 0.1
+    assert np.abs(white - other)[inside].mean() < 3

@@ -62,6 +62,13 @@ def test_a_region_of_similar_colour_is_the_leaf_with_all_that_is_written_on_it()
     assert not (covered & ~leaf).any()
 
 
+def test_a_large_photograph_is_flooded_where_a_small_one_is() -> None:
+    large = np.kron(page(), np.ones((5, 5), np.uint8))
+    small = stroke(Tool.SIMILAR, (440, 110), tolerance=20).covered(page())
+    covered = stroke(Tool.SIMILAR, (440 * 5 + 2, 110 * 5 + 2), tolerance=20).covered(large)
+    assert (covered != np.kron(small, np.ones((5, 5), bool))).mean() < 0.002
+
+
 def test_a_sleeve_does_not_swallow_the_leaf_within_it() -> None:
     covered = stroke(Tool.SIMILAR, (50, 50), tolerance=20).covered(page())
     assert covered[30:90, 30:570].all()

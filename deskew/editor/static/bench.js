@@ -118,6 +118,7 @@ class Bench {
 
   close() {
     this.model.off("msg:custom", this.received);
+    clearTimeout(this.patience);
     Object.values(this.urls).forEach((url) => URL.revokeObjectURL(url));
   }
 
@@ -138,10 +139,19 @@ class Bench {
     this.find(".busy").textContent = "solving …";
     this.root.setAttribute("aria-busy", "true");
     this.model.send(this.waiting);
+    clearTimeout(this.patience);
+    this.patience = setTimeout(() => this.complain("No answer yet: does `deskew edit` still run? What is painted is kept."), 20000);
+  }
+
+  complain(error) {
+    const failed = this.find(".error");
+    failed.textContent = error;
+    failed.hidden = !error;
   }
 
   async answered(content, buffers) {
     if (content.id !== this.waiting?.id) return;
+    clearTimeout(this.patience);
     const made = this.waiting.do;
     this.state = content;
     const decoded = content.pictures.map((name, i) => this.picture(name, buffers[i]));
@@ -179,9 +189,7 @@ class Bench {
     const state = this.state;
     this.find("h1").textContent = `Stiffness of ${state.name}`;
     this.find(".files").textContent = `${state.saved ? "Saved in" : "Kept as a draft; to be saved in"} ${state.files.map}`;
-    const failed = this.find(".error");
-    failed.textContent = state.error;
-    failed.hidden = !state.error;
+    this.complain(state.error);
     this.find(".said").textContent = state.said;
     if (!state.materials.some((material) => material.label === this.label)) this.label = state.materials.at(-1).label;
     this.showMaterials();
@@ -426,6 +434,7 @@ class Bench {
       this.crossed = true;
       if (this.path.length && this.tool === "brush") this.path.push(this.cross);
       this.drawKeyed();
+      this.follow();
       this.find(".place").textContent = `Cross at x ${Math.round(this.cross[0])}, y ${Math.round(this.cross[1])} px`;
     } else if (event.key === " ") {
       this.crossed = true;
@@ -441,6 +450,15 @@ class Bench {
       this.clear();
     } else return;
     event.preventDefault();
+  }
+
+  follow() {
+    const frame = this.find(".frame");
+    const share = this.canvas.clientWidth / this.state.size[0];
+    const [x, y] = this.cross.map((value) => value * share);
+    const kept = (start, length, place) => Math.min(Math.max(start, place - 0.9 * length), place - 0.1 * length);
+    frame.scrollLeft = kept(frame.scrollLeft, frame.clientWidth, x);
+    frame.scrollTop = kept(frame.scrollTop, frame.clientHeight, y);
   }
 
   drawKeyed() {
