@@ -14,7 +14,7 @@ _STATIC = Path(__file__).parent / "static"
 
 
 class Bench(anywidget.AnyWidget):  # type: ignore[misc]
-    """The bench that a page is edited on; what it shows and how is written in `static/bench.js`.
+    """The bench that a page is edited on; what it shows and how is written in `static/`.
 
     Parameters
     ----------
@@ -22,7 +22,8 @@ class Bench(anywidget.AnyWidget):  # type: ignore[misc]
         What it shows and changes.
     """
 
-    _esm = (_STATIC / "bench.js").read_text(encoding="utf-8")
+    # One text, since a component has no place to import its parts from.
+    _esm = "\n".join((_STATIC / name).read_text(encoding="utf-8") for name in ("template.js", "painter.js", "bench.js"))
     _css = (_STATIC / "bench.css").read_text(encoding="utf-8")
 
     def __init__(self, desk: Desk) -> None:

@@ -291,6 +291,17 @@ def test_everything_is_done_by_keyboard(editor: Editor, window: Window) -> None:
     window.after(lambda: keyboard.press("Enter"))
     assert bench.locator("[data-key=number-1]").evaluate("element => element.getRootNode().activeElement === element")
 
+    name = bench.locator("[data-key=name-1]")
+    name.focus()
+    keyboard.press("Control+a")
+    keyboard.type("vell")
+    window.after(lambda: bench.locator(".undo").evaluate("undo => undo.click()"))
+    assert name.input_value() == "vell"  # an answer that comes while somebody types takes nothing away
+    keyboard.type("um")
+    window.after(lambda: keyboard.press("Tab"))
+    assert bench.locator("[data-key=name-1]").input_value() == "vellum"
+    window.after(lambda: bench.locator("[data-key=number-1]").fill("0.3") or keyboard.press("Enter"))
+
     bench.locator("summary").focus()
     keyboard.press("Enter")
     reached(".points")
