@@ -48,7 +48,8 @@ def table_html(table: Table, name: str) -> str:
     texts = [heading in _TEXT_COLUMNS for heading in table.headings]
     lines = "".join(_line(line, texts, metric) for line, metric in zip(table.lines, of_lines, strict=True))
     # What closes a cell or a line may be left out: a third of a large table.
-    content = f"<table><thead><tr>{heads}<tbody>{lines}</table>"
+    n_texts = next((i for i, text in enumerate(texts) if not text), len(texts))
+    content = f"<table class=lead-{n_texts}><thead><tr>{heads}<tbody>{lines}</table>"
     return element("div", content, class_="scroll", tabindex="0", role="region", aria_label=name)
 
 

@@ -25,6 +25,7 @@ _LIGHTS = {
 }
 _MAP = "viridis"  # even in lightness, and told apart by readers who do not tell red from green
 _N_STOPS = 17
+_ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 _TURNS = (
     ("ArrowLeft", "←", "Turn left"),
     ("ArrowRight", "→", "Turn right"),
@@ -46,9 +47,9 @@ def sheet_html(sheet: FallingSheet) -> str:
     lasts = len(sheet.frames) - 1
     return (
         f'<div class="stage" id="stage">{_canvas()}{_scale(full)}'
-        f'<div class="desk">{_fall(10 * lasts)}{_shown()}{_turning()}</div></div>'
+        f'<div class="desk">{_fall(10 * lasts)}<div class="choices">{_shown()}{_turning()}</div></div></div>'
         '<p id="no-view" hidden>This browser offers no WebGL, so the sheet is shown by its photographs alone.</p>'
-        "<noscript><p>Without scripts the sheet stands still: these are its photographs, as it lay.</p></noscript>"
+        '<p class="unscripted">Without scripts the sheet stands still: these are its photographs, as it lay.</p>'
         f"{_lights(sheet)}{_caption(sheet)}"
         f'<script type="application/json" id="recording">{packed(sheet)}</script>'
     )
@@ -58,7 +59,7 @@ def full_colour_mm(error_mm: Floats) -> float:
     """Return the end of the colour scale: of 100 vertices 99 lie below it, and it is a round number [mm]."""
     top = float(np.nanpercentile(error_mm, 99))
     unit = 10.0 ** np.floor(np.log10(top))
-    return float(np.ceil(top / unit * 2) / 2 * unit)
+    return float(next(end for end in _ROUND if end * unit >= top) * unit)
 
 
 def packed(sheet: FallingSheet) -> str:

@@ -31,7 +31,7 @@ _READOUT = data_synth.Format((1996, 1450), (3.0, 2.95), (40.0, 20.0))
 # Pixels of a kept picture for each of the scan's, and the desk that is left around the page [scan px].
 _PICTURE_SCALE, _MARGIN_PX = 2.4, 3.0
 # Steps between states among which those to be kept are chosen.
-_LOOKED_AT = 150
+_LOOKED_AT = 400
 _ARRAYS = ("frames", "steps", "times_s", "picture_xy", "error_mm", "best_error_mm")
 _PICTURE = "light_"
 
@@ -115,7 +115,7 @@ def fallen(sheet: Sheet, n_frames: int = N_FRAMES) -> tuple[Floats, npt.NDArray[
     sheet : Sheet
         Grid [mm].
     n_frames : int
-        States to keep.
+        States to keep, fewer than the run has steps.
 
     Returns
     -------
@@ -136,7 +136,8 @@ def fallen(sheet: Sheet, n_frames: int = N_FRAMES) -> tuple[Floats, npt.NDArray[
         raise StepError(f"The recorded sheet ended {end.status}, not flat: {end.remedy}")
     start = sheet.vertices - [0.0, 0.0, sheet.vertices[..., 2].min()]
     n_steps = int(end.counters["steps"])
-    looked_at = np.unique(np.linspace(1, n_steps - 1, _LOOKED_AT).astype(int))
+    # It falls fast and settles slowly: every early step is looked at, and ever fewer later ones.
+    looked_at = np.unique(np.geomspace(1, n_steps - 1, _LOOKED_AT).astype(int))
     between = [flattening.flatten(sheet, method=PAPER, max_steps=int(n)) for n in looked_at]
     states = [start, *(state.vertices for state in between), end.vertices]
     steps = np.array([0, *looked_at, n_steps])
@@ -145,7 +146,9 @@ def fallen(sheet: Sheet, n_frames: int = N_FRAMES) -> tuple[Floats, npt.NDArray[
     # Never upwards, so that each share of the way has one first state that has gone it.
     way = 1 - np.minimum.accumulate(left) / left[0]
     kept = np.searchsorted(way, np.linspace(0.0, 1.0, n_frames))
-    kept[0], kept[-1] = 0, len(states) - 1
+    # No state twice: each comes after the one before it, and leaves as many for those after it.
+    rank = np.arange(n_frames)
+    kept = np.minimum(np.maximum.accumulate(kept - rank) + rank, len(states) - n_frames + rank)
     return np.stack([states[i] for i in kept]), steps[kept], times[kept]
 
 
