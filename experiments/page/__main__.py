@@ -59,7 +59,9 @@ def write_page(reports: Path, out: Path, kept: Path = _ROOT / "out") -> None:
     require_writable(out, (".html",))
     runs = read_runs(reports)
     claims = judged_claims(Evidence(reports))
+    print("The page that falls flat: recorded once, in a minute or two, then kept.", file=sys.stderr)
     sheet = kept_falling_sheet(_SEED, kept / "falling_sheet", kept / "calibrations")
+    print(f"Tables and figures of {len(runs)} reports.", file=sys.stderr)
     write_bytes(document(runs, claims, sheet).encode(), out)
 
 

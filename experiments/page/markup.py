@@ -50,7 +50,7 @@ def table_html(table: Table, name: str) -> str:
     # What closes a cell or a line may be left out: a third of a large table.
     n_texts = next((i for i, text in enumerate(texts) if not text), len(texts))
     content = f"<table class=lead-{n_texts}><thead><tr>{heads}<tbody>{lines}</table>"
-    return element("div", content, class_="scroll", tabindex="0", role="region", aria_label=name)
+    return element("div", content, class_="scroll", tabindex="0", role="group", aria_label=name)
 
 
 def _head(heading: str, metric: str) -> str:

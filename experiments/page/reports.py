@@ -67,7 +67,7 @@ def _figure(run: Run, captions: Mapping[str, str], path: Path, picture: Picture)
         f'alt="{escape(text)}" loading="lazy" decoding="async">'
     )
     # What scrolls has to be reached by keyboard.
-    scrolled = {"tabindex": "0", "role": "region", "aria_label": f"Figure: {text}"} if broad else {}
+    scrolled = {"tabindex": "0", "role": "group", "aria_label": f"Figure: {text}"} if broad else {}
     box = element("div", image, class_="picture wide" if broad else "picture", **scrolled)
     caption = f"{inline(text)}. From {escape(run.name)}/figures/{escape(path.name)}: {escape(made(run))}."
     return element("figure", box + element("figcaption", caption), class_="broad" if broad else "plain")

@@ -55,7 +55,7 @@
   }
   // What the Tab key should reach, in the order of the document.
   window.stops = () =>
-    [...document.querySelectorAll('a[href], button, input, summary, canvas[tabindex], [role="region"][tabindex]')].filter(
+    [...document.querySelectorAll('a[href], button, input, summary, canvas[tabindex], [role="group"][tabindex]')].filter(
       (element) =>
         (visible(element) || element.className === 'skip') &&
         !(element.type === 'radio' && !element.checked) &&

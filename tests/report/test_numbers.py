@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -37,13 +38,20 @@ class Recorded:
         self.columns = columns
         self.results, self.timings = (_by_place(folder / f"{kind}.csv") for kind in ("results", "timings"))
         self.failures = json.loads((folder / "run.json").read_text())["failures"]
-        self.whole = [f for f in self.failures if f["method"] == "-"]
 
     def of(self, condition: str, method: str, metric: str) -> pd.Series[float]:
         return self.results.get((condition, method, metric), pd.Series(dtype=float))
 
+    @cache  # noqa: B019
     def n_failed(self, condition: str, method: str) -> int:
-        return len(self.of(condition, method, "failed"))
+        """Count the pages that failed there, and those whose trial failed as a whole before it gave a number there."""
+        here = [values for (*place, metric), values in self.results.items() if place == [condition, method]]
+        gave = {page for values in here for page in values.index}
+        lost = set(self.of(condition, method, "failed").index)
+        for (planned, by, metric), values in self.results.items():
+            if (by, metric) == ("-", "failed") and set(planned.split("/")) - {"-"} <= set(condition.split("/")):
+                lost |= set(values.index) - gave
+        return len(lost)
 
 
 def _by_place(path: Path) -> Values:
@@ -92,6 +100,9 @@ def check_headlines(table: FoundTable, run: Recorded) -> int:
     count = 0
     for condition, method, line, _ in places(table):
         n_failed = int(line[table.column("failed")])
+        assert n_failed == run.n_failed(condition, method), line
+        counts = [len(run.of(condition, method, metric)) for metric in table.of_columns if metric]
+        assert int(line[table.column("n")]) == max(counts), line
         for cell, metric in zip(line, table.of_columns, strict=True):
             if not metric:
                 continue
@@ -109,19 +120,37 @@ def check_headlines(table: FoundTable, run: Recorded) -> int:
 
 def check_all_trials(table: FoundTable, run: Recorded) -> int:
     for condition, method, line, metric in places(table):
-        if not metric:
-            assert run.n_failed(condition, method) or run.whole
-            continue
-        n, n_failed, mean, _, median, least, p90, largest, _ = line[3:]
+        n, n_failed, mean, interval, median, least, p90, largest, _ = line[3:]
+        assert int(n_failed) == run.n_failed(condition, method), line
         values = run.of(condition, method, metric)
         assert int(n) == len(values)
+        if not metric:
+            continue
         lost = int(n_failed) if run.columns[metric].share else 0
         assert agrees(mean, values.sum() / (len(values) + lost)), line
+        check_interval(interval, values, lost, share=run.columns[metric].share)
         assert agrees(median, values.median()), line
         assert agrees(least, values.min()), line
         assert agrees(largest, values.max()), line
         assert p90 == _NONE if len(values) < 10 else agrees(p90, np.quantile(values, 0.9)), line
     return 6 * len(table.lines)
+
+
+def check_interval(cell: str, values: pd.Series[float], lost: int, *, share: bool) -> None:
+    """A share's interval is Wilson's; a mean's holds the mean and lies among the values, without width if all agree."""
+    if cell == _NONE:
+        assert len(values) < 3
+        return
+    low, high = cell.split("..")
+    if share:
+        ends = wilson(int(values.sum()), len(values) + lost)
+        assert agrees(low, ends[0])
+        assert agrees(high, ends[1])
+        return
+    half = 0.5 * 10.0 ** -len(low.partition(".")[2]) * (1 + 1e-6)
+    assert values.min() - half <= float(low) <= values.mean() + half, (cell, values.mean())
+    assert values.mean() - half <= float(high) <= values.max() + half, (cell, values.mean())
+    assert (float(low) < float(high)) or values.std() < 20 * half
 
 
 def check_each_trial(table: FoundTable, run: Recorded) -> int:
@@ -162,6 +191,10 @@ def check_pair(one: pd.Series[float], other: pd.Series[float], cells: dict[str, 
     return len(cells)
 
 
+def check_lost(cell: str, run: Recorded, one: tuple[str, str], other: tuple[str, str]) -> None:
+    assert cell == f"{run.n_failed(*one)} ({run.n_failed(*other)})"
+
+
 def check_versus(table: FoundTable, run: Recorded) -> int:
     baseline = re.search(r"Method against method: (\S+)$", table.title)
     assert baseline is not None
@@ -169,7 +202,12 @@ def check_versus(table: FoundTable, run: Recorded) -> int:
     for condition, method, line, metric in places(table):
         named = {"pages": "pages", "difference": "difference", "ratio": "ratio of means", "better": "better on"}
         cells = {key: line[table.column(heading)] for key, heading in named.items()}
-        count += check_pair(run.of(condition, method, metric), run.of(condition, against, metric), cells)
+        one, other = run.of(condition, method, metric), run.of(condition, against, metric)
+        count += check_pair(one, other, cells)
+        both = one.index.intersection(other.index)
+        equal = line[table.column("equal on")]
+        assert equal == (str((one.loc[both] == other.loc[both]).sum()) if len(both) else _NONE)
+        check_lost(line[table.column("failed (against)")], run, (condition, method), (condition, against))
     return count
 
 
@@ -177,6 +215,7 @@ def check_changes(table: FoundTable, run: Recorded) -> int:
     count = 0
     for condition, method, line, _ in places(table):
         against = line[table.column("against")]
+        check_lost(line[table.column("failed (against)")], run, (condition, method), (against, method))
         metrics = [(metric, cell) for metric, cell in zip(table.of_columns, line, strict=True) if metric]
         for i, (metric, cell) in enumerate(metrics):
             cells = {"difference": cell} if cell != _NONE else {}

@@ -6,6 +6,7 @@ import json
 import re
 from base64 import b64decode, b64encode
 from hashlib import sha256
+from html import escape
 from pathlib import Path
 
 import cv2
@@ -13,13 +14,16 @@ import numpy as np
 import pytest
 
 from experiments.page.__main__ import main
+from experiments.page.document import document
 from experiments.page.markup import inline, slug
 from experiments.page.pictures import figure_picture
-from experiments.page.reports import made, reports_html
+from experiments.page.reports import made
 from experiments.page.runs import Run, read_runs
 from experiments.page.sheet import full_colour_mm, packed
+from experiments.page.verdicts import judged_claims
+from experiments.reporting.claims.measures import Evidence
 from experiments.studies.falling_sheet import FallingSheet
-from tests.report.tables_in import tables_in
+from tests.report.tables_in import Reader, tables_in
 
 HOSTILE = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>"
 HEADER = "experiment,condition,method,trial,seed,metric,value,unit\n"
@@ -49,14 +53,25 @@ def reports(tmp_path: Path) -> Path:
     return tmp_path / "reports"
 
 
-def test_hostile_text_stays_text(reports: Path) -> None:
-    html = reports_html(read_runs(reports))
-    assert "<script" not in html
-    assert "onerror=alert" not in html.replace("img src=x onerror=alert", "")
+def test_hostile_text_stays_text(reports: Path, sheet: FallingSheet) -> None:
+    html = document(read_runs(reports), judged_claims(Evidence(reports)), sheet)
+    reader = Reader()
+    reader.feed(html)
+    assert reader.tags.count("script") == 3  # two of its own, and the recorded sheet's numbers
+    assert reader.tags.count("img") == 6  # five lights and one figure
     assert "<img src=x" not in html
+    assert escape(HOSTILE) in html
     tables = tables_in(html)
     assert [table.lines for table in tables if "reason" in table.headings] == [[["0", "1", *[HOSTILE] * 3]]]
-    assert any(line[0] == HOSTILE for line in tables[1].lines)
+    assert any(line[0] == HOSTILE for table in tables for line in table.lines if table.section == "evil")
+
+
+def test_claim_without_its_report_is_not_tested(reports: Path, sheet: FallingSheet) -> None:
+    claims = judged_claims(Evidence(reports))
+    html = document(read_runs(reports), claims, sheet)
+    n_lines = sum(len(claim.lines) for claim in claims)
+    assert f'aria-label="{n_lines} not tested: report missing"' in html
+    assert html.count('<dd class="main">–') == 6
 
 
 def test_report_is_one_small_file_under_a_policy_that_lets_nothing_in(report: Path) -> None:

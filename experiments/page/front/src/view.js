@@ -26,7 +26,7 @@ import { colourOf } from './colours.js'
 import { stateAt } from './recording.js'
 
 const GRID_MM = 50
-const MARGIN = 0.9
+const MARGIN = 1
 
 // From in front of the bed, a little to the left.
 export const FIRST = { azimuth: -1.75, elevation: 0.72, zoom: 1 }
