@@ -32,6 +32,7 @@ _WARM = (
     *("experiments.program", "experiments.studies.surfaces", "experiments.studies.ocr_misses", "tqdm"),
     *("data_synth.captures", "experiments.hidden_seeds", "experiments.reporting.agreement"),
     *("experiments.reporting.claims.__main__", "experiments.reporting.generated", "experiments.reporting.moved"),
+    *("experiments.gate.command", "experiments.page.__main__", "deskew.editor"),
 )
 
 
@@ -39,6 +40,7 @@ def entry_of(program: str) -> Callable[[list[str]], Any]:
     """Return the function that a program's own `python -m` calls with its arguments."""
     names = {"deskew": "deskew.cli", "experiments": "experiments.program"}
     names["experiments.reporting.claims"] = "experiments.reporting.claims.__main__"
+    names |= {"experiments.gate": "experiments.gate.command", "experiments.page": "experiments.page.__main__"}
     entry: Callable[[list[str]], Any] = import_module(names.get(program, program)).main
     return entry
 

@@ -83,6 +83,24 @@ def _photograph(folder: Path) -> object:
     return grey_photograph(folder / "photograph.jpg"), true_words(folder / "words.json")
 
 
+def _baseline(folder: Path) -> object:
+    from experiments.gate.baseline import read_baseline
+
+    return read_baseline(folder / "baseline.csv")
+
+
+def _reports(folder: Path) -> object:
+    from experiments.page.runs import read_runs
+
+    return read_runs(folder / "reports")
+
+
+def _draft(folder: Path) -> object:
+    from deskew.editor.draft import read_draft
+
+    return read_draft(folder / "map.draft.npz")
+
+
 def _sheet(folder: Path) -> object:
     from experiments.studies.given_sheets import read_sheet
 
@@ -121,6 +139,9 @@ READERS = {
         ),
         Reader("results", ("reports/surfaces/results.csv",), _table),
         Reader("photograph", ("photograph.jpg", "words.json"), _photograph),
+        Reader("baseline", ("baseline.csv", "baseline.json", "baseline.floors.csv"), _baseline),
+        Reader("reports", ("reports/surfaces/results.csv", "reports/surfaces/run.json"), _reports),
+        Reader("draft", ("map.draft.npz",), _draft),
         Reader("evidence", ("reports/surfaces/results.csv",), _evidence),
     )
 }

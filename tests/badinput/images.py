@@ -7,6 +7,7 @@ import struct
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from tests.badinput.case import Break, Case, written
 from tests.badinput.forged import SIGNATURE, chunk, png, tiff
@@ -126,6 +127,12 @@ CASES: tuple[Case, ...] = (
         lambda here: (here / "a.png").write_bytes(_twice()),
     ),
     scored("a picture in a format that is not read", "a.jpg", ("end in one of", ".jpg"), encoded("a.jpg", ".jpg")),
+    scored(
+        "a TIFF of 64-bit colour",
+        "a.tif",
+        ("8 or 16 bits", "float64"),
+        lambda here: (here / "a.tif").write_bytes(cv2.imencode(".tif", np.ones((48, 64, 3)))[1].tobytes()),
+    ),
     scored("a truth that is a mesh", "grey.png", (), lambda here: shutil.copy(here / "bent.obj", here / "grey.png")),
     Case(
         "a mask of another size",

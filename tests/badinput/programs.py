@@ -48,24 +48,16 @@ def claims(what: str, broken: Break, *words: str) -> Case:
 CONFIGURATIONS = (
     Case("no experiment", "experiments", ("`experiment`", "one of ablations", "nothing")),
     Case("an unknown experiment", "experiments experiment=surface", ("`experiment`", "surfaces", "'surface'")),
-    config("a misspelt setting", "trails=3", "`trails`", "known key", "trials"),
-    config("a key of another group", "rig.slope=3", "`rig.slope`", "noise_scale"),
     config("trials below one", "trials=0", "`trials`", "[1, 100000]", "0"),
-    config("trials of 10^30", f"trials={10**30}", "`trials`", "[1, 100000]"),
-    config("a seed of half", "seed=0.5", "`seed`", "[0, 4294967295]", "0.5"),
     config("added noise of NaN", "surfaces.noise_mm=nan", "`surfaces.noise_mm`", "[0, 10]", "nan"),
-    config("noise of 1e999", "surfaces.noise_mm=1e999", "`surfaces.noise_mm`", "[0, 10]"),
     config("a list where a number is due", "mesh.rows=[1,2]", "`mesh.rows`", "[2, 1000]", "[1, 2]"),
-    config("a mapping where a number is due", "mesh.rows={a:1}", "`mesh.rows`", "[2, 1000]"),
     config("an override that cannot be parsed", "'trials=[[['", "`trials=[[[`", "KEY=VALUE"),
     config("an override nested 3000 deep", "trials=" + "[" * 3000 + "]" * 3000, "nested less deeply"),
     config("a value for the environment", "'out=${oc.env:DESKEW_NO_SUCH}'", "DESKEW_NO_SUCH"),
     config("a number from the environment", "'trials=${oc.env:HOME}'", "`trials`", "[1, 100000]"),
     config("a reference to itself", "'trials=${trials}'", "`trials`"),
-    config("a reference to nothing", "'seed=${nope}'", "`seed`", "${nope}"),
     config("a resolver that is not there", "'seed=${eval:1+1}'", "`seed`"),
     config("a choice by a budget that is not there", "'trials=${at:huge,1,2,3}'", "`trials`"),
-    config("a choice by budget without its values", "'trials=${at:smoke}'", "`trials`"),
     config("a decoded bomb", "'trials=${oc.decode:${oc.env:PATH}}'", "KEY=VALUE"),
     config("a method that is not there", "method=no.such:thing", "`method`", "no.such:thing"),
     config("a rerun from a pickle", "--experimental-rerun bent.obj", "--experimental-rerun", "unpickle"),
@@ -166,6 +158,12 @@ TABLES = (
         written("reports/corner_distance/results.csv", "a,b\n1,2\n"),
         "`reports/corner_distance/results.csv`",
     ),
+    claims(
+        "claims of a table with a line cut short",
+        written("reports/corner_distance/results.csv", TABLE + "corner_distance,control,-,0,1"),
+        "`reports/corner_distance/results.csv`",
+        "cut short",
+    ),
     Case("claims of no folder", "experiments.reporting.claims nowhere", ("`REPORTS_FOLDER`", "be a folder", "nowhere")),
     Case(
         "seeds by a digest that is none",
@@ -179,4 +177,67 @@ TABLES = (
     Case("an unknown option for the generated pages", "experiments.reporting.generated --chek", ("--check",)),
 )
 
-CASES: tuple[Case, ...] = CONFIGURATIONS + SHEETS_GIVEN + TABLES
+GATE = "experiments.gate --baseline baseline.csv --results reports/surfaces/results.csv"
+PAGE = "experiments.page --reports reports --out out/page.html"
+JUDGED = (
+    Case("a baseline that is not there", GATE.replace("baseline.csv", "no.csv"), ("`no.csv`", "be a file")),
+    Case("a baseline that is a pipe", GATE, ("`baseline.csv`", "be a file"), pipe("baseline.csv")),
+    Case("a baseline of words", GATE, ("`baseline.csv`", "much"), edited("baseline.csv", "0.25", "much")),
+    Case("a baseline of NaN", GATE, ("`baseline.csv`", "finite", "nan"), edited("baseline.csv", "0.25", "nan")),
+    Case("a baseline of other columns", GATE, ("`baseline.csv`", "columns"), written("baseline.csv", "a,b\n1,2\n")),
+    Case("a baseline of nothing known", GATE, ("`baseline.json`",), written("baseline.json", "[" * 100_000)),
+    Case(
+        "a baseline of another version", GATE, ("`baseline.json`", "version 9"), edited("baseline.json", ": 1,", ": 9,")
+    ),
+    Case("floors of words", GATE, ("`baseline.floors.csv`", "much"), edited("baseline.floors.csv", "0.01", "much")),
+    Case(
+        "results of bytes for the gate",
+        GATE,
+        ("results.csv",),
+        written("reports/surfaces/results.csv", bytes(range(256))),
+    ),
+    Case("a page of no reports", PAGE.replace("reports reports", "reports out"), ("`--reports`", "run.json", "none")),
+    Case("a page of a damaged run", PAGE, ("reports/surfaces",), written("reports/surfaces/run.json", "[" * 100_000)),
+    Case(
+        "a page of a run of nothing known",
+        PAGE,
+        ("`reports/surfaces`", "experiment"),
+        written("reports/surfaces/run.json", "{}"),
+    ),
+    Case("a page of a run that is a pipe", PAGE, ("run.json",), pipe("reports/surfaces/run.json")),
+    Case(
+        "a page of words for numbers",
+        PAGE,
+        ("reports/surfaces", "much"),
+        edited("reports/surfaces/results.csv", "0.25", "much"),
+    ),
+    Case("a page into another format", PAGE.replace(".html", ".pdf"), (".html", ".pdf")),
+    Case(
+        "an editor of no capture",
+        "deskew edit nowhere -c c.json -o out/m.png --no-browser",
+        ("`nowhere`", "be a folder"),
+    ),
+    Case(
+        "an editor of a capture without its devices",
+        "deskew edit page -o out/m.png --no-browser",
+        ("`--calibration`", "none"),
+    ),
+    Case(
+        "an editor of a damaged scan",
+        "deskew edit scan.npz -o out/m.png --no-browser",
+        ("`scan.npz`",),
+        written("scan.npz", b""),
+    ),
+    Case(
+        "an editor of a map in another format",
+        "deskew edit scan.npz -o out/m.tif --no-browser",
+        ("end in .png", ".tif"),
+    ),
+    Case(
+        "an editor on port 65536",
+        "deskew edit scan.npz -o out/m.png --port 65536 --no-browser",
+        ("`--port`", "[0, 65535]"),
+    ),
+)
+
+CASES: tuple[Case, ...] = CONFIGURATIONS + SHEETS_GIVEN + TABLES + JUDGED

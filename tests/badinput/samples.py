@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,6 +31,9 @@ PAGE_MM = data_synth.PAGE_SIZE_MM
 TABLE = """experiment,condition,method,trial,seed,metric,value,unit
 surfaces,flattened/cone,arap,0,1,flat_mean_mm,0.25,mm
 surfaces,flattened/cone,spring,0,1,flips,0.0,1
+"""
+FLOORS = """experiment,condition,method,metric,unit,draws,run_sd,page_sd
+surfaces,flattened/cone,arap,flat_mean_mm,mm,10,0.01,0.02
 """
 SEEDS = f"salt {'0' * 64}\n123456\n"
 
@@ -101,7 +105,8 @@ def write_samples(folder: Path) -> None:
     folder : Path
         Empty. Gets `page` (Gray code), `sweep`, `phase`, `board`, `c.json`, `scan.npz`, `depth.npz`, `bent.obj`,
         `bent.ply`, `unit.obj`, `segment`, `materials.png` and `.toml`, `mask.png`, `grey.png`, `colour.png`,
-        `deep.tif`, `sheet.npz`, `reports/NAME/results.csv`, `seeds.txt`, `photograph.jpg`, `words.json` and an
+        `deep.tif`, `sheet.npz`, `reports/NAME/results.csv`, `seeds.txt`, `photograph.jpg`, `words.json`,
+        `baseline.csv`, `.json` and `.floors.csv`, `map.draft.npz` and an
         empty folder `out`.
     """
     io.write_capture(capture(), folder / "page")
@@ -130,10 +135,25 @@ def write_samples(folder: Path) -> None:
     for report in ("surfaces", "corner_distance"):
         (folder / "reports" / report).mkdir(parents=True)
         (folder / "reports" / report / "results.csv").write_text(TABLE)
+    _write_baseline(folder)
+    table = np.frombuffer(b'[[0, "paper", 30.0], [255, "vellum", 0.3]]', np.uint8)
+    io.write_arrays({"labels": pixels(7).astype(np.uint16) // 128 * 255, "materials": table}, folder / "map.draft.npz")
     (folder / "seeds.txt").write_text(SEEDS)
     (folder / "photograph.jpg").write_bytes(cv2.imencode(".jpg", pixels(6, (64, 48), 3))[1].tobytes())
     (folder / "words.json").write_text('[{"text": "Invoice"}, {"text": "2001", "box": [1, 2]}]')
     (folder / "out").mkdir()
+
+
+def _write_baseline(folder: Path) -> None:
+    """Write `baseline.csv` of the gate with what lies beside it, and what a page of the reports needs."""
+    (folder / "baseline.csv").write_text(TABLE)
+    settings = [{"experiment": "surfaces", "seed": 1, "method": ["arap", "spring"]}]
+    about = {"version": 1, "runs": [["experiment=surfaces", "trials=1"]], "settings": settings}
+    (folder / "baseline.json").write_text(json.dumps(about, indent=1))
+    (folder / "baseline.floors.csv").write_text(FLOORS)
+    run = {"commit": "0" * 40, "config": {"seed": 1}, "experiment": "surfaces", "machine": {}, "versions": {}}
+    failure = {"condition": "flattened/cone", "method": "arap", "trial": 0, "seed": 1, "reason": "none"}
+    (folder / "reports" / "surfaces" / "run.json").write_text(json.dumps({**run, "failures": [failure]}, indent=1))
 
 
 def _depth_of(plane: Array) -> DepthMap:
