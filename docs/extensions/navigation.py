@@ -10,7 +10,7 @@ INDEX = "docs/README"
 
 # Heading of the side bar: pages; a star takes all that match.
 PAGES = {
-    "Use": ("README", "docs/capture-guide", "docs/own-method", "docs/scaling"),
+    "Use": ("README", "docs/capture-guide", "docs/own-method", "docs/gate", "docs/gate-faults", "docs/scaling"),
     "Understand": ("docs/how-it-works", "docs/rig", "docs/results", "reports/CLAIMS", "docs/adr/README"),
     "Reference": ("docs/api/*",),
     "Compare": ("RULES", "ARTIFACT", "DATASHEET", "REFORMS", "reports/NULLS", "reports/SYNTHETIC_AND_REAL"),
