@@ -19,7 +19,7 @@ from sphinx.environment import BuildEnvironment
 from sphinx.util.nodes import make_refnode
 
 CLASS_NAME = re.compile(r"[A-Z][a-z]+(?:[A-Z][a-z]*)*")
-ELSEWHERE = {"Path"}  # classes of other projects, whose inventories lie on the network
+ELSEWHERE = {"Path", "numpy.random.Generator"}  # whose inventories lie on the network
 
 
 def find(app: Sphinx, env: BuildEnvironment, reference: pending_xref, content: nodes.TextElement) -> nodes.Node | None:
@@ -30,12 +30,13 @@ def find(app: Sphinx, env: BuildEnvironment, reference: pending_xref, content: n
     assert isinstance(domain, PythonDomain)
     target = reference["reftarget"].lstrip(".")
     last = target.rpartition(".")[2]
+    if reference["reftype"] == "class" and (not CLASS_NAME.fullmatch(last) or target in ELSEWHERE):
+        return content
     found = {name: at for name, at in domain.objects.items() if name.rpartition(".")[2] == last and not at.aliased}
     if len(found) == 1:
         [(name, at)] = found.items()
         return make_refnode(app.builder, reference["refdoc"], at.docname, at.node_id, content, name)
-    prose = reference["reftype"] == "class" and (not CLASS_NAME.fullmatch(target) or target in ELSEWHERE)
-    return content if prose or is_inside(last) else None
+    return content if is_inside(last) else None
 
 
 def is_inside(name: str) -> bool:

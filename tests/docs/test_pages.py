@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import tomllib
 from collections.abc import Iterator
@@ -58,6 +59,18 @@ def test_every_page_of_the_folder_is_in_its_index() -> None:
 def named_functions() -> list[tuple[str, str]]:
     text = (ROOT / "docs/how-it-works.md").read_text()
     return sorted(set(_FUNCTION.findall(text)))
+
+
+def test_the_reference_has_a_page_for_every_public_module_whose_names_all_say_what_they_are() -> None:
+    pages = {page.stem: page.read_text() for page in ROOT.glob("docs/api/*.md")}
+    modules = [import_module(found) for text in pages.values() for found in re.findall(r"automodule:: (\S+)", text)]
+    stages = {"acquisition", "flattening", "restoration", "metrics", "io", "types", "errors", "plugins", "pipeline"}
+    assert {"deskew", "data_synth", *stages} <= set(pages)
+    for module in modules:
+        public = getattr(module, "__all__", [name for name in vars(module) if not name.startswith("_")])
+        things = [getattr(module, name) for name in public]
+        ours = [thing for thing in things if getattr(thing, "__module__", "").startswith(("deskew", "data_synth"))]
+        assert [thing for thing in ours if not inspect.getdoc(thing)] == [], module.__name__
 
 
 def test_every_function_that_a_page_names_exists() -> None:
