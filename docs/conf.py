@@ -43,6 +43,7 @@ nitpicky = True
 html_theme = "furo"
 html_title = "deskew"
 html_copy_source = False
+html_show_copyright = False
 html_show_sourcelink = False
 html_static_path = ["static"]
 html_extra_path = ["extra"]  # index.html, which leads to the index of the documentation

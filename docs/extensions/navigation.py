@@ -8,22 +8,23 @@ from sphinx.application import Sphinx
 
 INDEX = "docs/README"
 
-# Heading of the side bar: pages; a star takes all that match.
+# Heading of the side bar: pages, or a title and a page; a star takes all that match.
 PAGES = {
-    "Use": ("README", "docs/capture-guide", "docs/own-method", "docs/gate", "docs/gate-faults", "docs/scaling"),
+    "Use": ("Overview </README>", "docs/capture-guide", "docs/own-method", "docs/gate", "docs/scaling"),
     "Understand": ("docs/how-it-works", "docs/rig", "docs/results", "reports/CLAIMS", "docs/adr/README"),
     "Reference": ("docs/api/*",),
     "Compare": ("RULES", "ARTIFACT", "DATASHEET", "REFORMS", "reports/NULLS", "reports/SYNTHETIC_AND_REAL"),
     "Project": ("CONTRIBUTING", "CHANGELOG"),
 }
 SINGLE_TRIALS = re.compile(r"^## (?:All trials|Each trial)\n.*?(?=^## |\Z)", re.DOTALL | re.MULTILINE)
-HIDDEN = {INDEX: "reports/*/table", "docs/adr/README": "docs/adr/[0-9t]*"}
+HIDDEN = {INDEX: "reports/*/table", "docs/gate": "docs/gate-faults", "docs/adr/README": "docs/adr/[0-9t]*"}
 
 
 def toctree(pages: tuple[str, ...], caption: str = "") -> str:
     """Return the directive that lists pages."""
     options = ":hidden:\n:glob:\n" + (f":caption: {caption}\n" if caption else "")
-    return "\n```{toctree}\n" + options + "\n" + "\n".join(f"/{page}" for page in pages) + "\n```\n"
+    entries = (page if "<" in page else f"/{page}" for page in pages)
+    return "\n```{toctree}\n" + options + "\n" + "\n".join(entries) + "\n```\n"
 
 
 def add(app: Sphinx, page: str, source: list[str]) -> None:
