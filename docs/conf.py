@@ -1,4 +1,4 @@
-"""The documentation as one site: `sphinx-build -W -n -c docs . out/docs`, which is `make docs`.
+"""The documentation as one site: `sphinx-build -E -W -n -c docs . out/docs`, which is `make docs`.
 
 The checkout itself is the source folder, so that a link from any Markdown file to any other is the same on the site as
 in the repository, and is checked. Nothing is fetched: equations are MathML (`extensions/mathml.py`), the theme's fonts

@@ -92,17 +92,6 @@ def test_every_section_and_equation_of_the_paper_leads_to_a_function() -> None:
     assert all(_FUNCTION.search(row[4]) for row in rows)
 
 
-def test_every_decision_is_named_where_it_acts_or_says_that_it_is_about_the_experiments() -> None:
-    """Decisions on a stage are linked from the page that explains the stages."""
-    page = (ROOT / "docs/how-it-works.md").read_text() + (ROOT / "docs/rig.md").read_text()
-    missing = {path.name[:4] for path in ROOT.glob("docs/adr/0*.md") if path.name not in page}
-    assert missing <= {
-        "0024",
-        "0027",
-        "0028",
-    }  # engines, methods' own processes, the gate: nothing that a page goes through
-
-
 def messages() -> list[str]:
     """Every text in the sources, what is filled in later shown as `...`."""
     found = []
