@@ -10,7 +10,14 @@ INDEX = "docs/README"
 
 # Heading of the side bar: pages, or a title and a page; a star takes all that match.
 PAGES = {
-    "Use": ("Overview </README>", "docs/capture-guide", "docs/own-method", "docs/gate", "docs/scaling"),
+    "Use": (
+        "Overview </README>",
+        "docs/capture-guide",
+        "docs/stiffness-editor",
+        "docs/own-method",
+        "docs/gate",
+        "docs/scaling",
+    ),
     "Understand": ("docs/how-it-works", "docs/rig", "docs/results", "reports/CLAIMS", "docs/adr/README"),
     "Reference": ("docs/api/*",),
     "Compare": ("RULES", "ARTIFACT", "DATASHEET", "REFORMS", "reports/NULLS", "reports/SYNTHETIC_AND_REAL"),

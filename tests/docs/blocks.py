@@ -6,11 +6,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import dedent
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (ROOT / "README.md", *sorted(ROOT.glob("docs/*.md")))
 
-_FENCE = re.compile(r"^```(?P<language>[\w-]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+_FENCE = re.compile(r"^(?P<indent> *)```(?P<language>[\w-]*)\n(?P<text>.*?)^(?P=indent)```$", re.DOTALL | re.MULTILINE)
 _INDENTED = re.compile(r"^(?:    |\t)\S.*$", re.MULTILINE)
 
 
@@ -38,7 +39,7 @@ def blocks(page: Path) -> list[Block]:
     text = page.read_text(encoding="utf-8")
     name = page.relative_to(ROOT)
     return [
-        Block(f"{name}:{text.count(chr(10), 0, found.start()) + 1}", found["language"], found["text"])
+        Block(f"{name}:{text.count(chr(10), 0, found.start()) + 1}", found["language"], dedent(found["text"]))
         for found in _FENCE.finditer(text)
     ]
 

@@ -36,6 +36,8 @@ NOT_RUN = {
     "make setup": "made the environment that runs this, as the first step of CI",
     "make check": "is a step of CI by itself, `.ci/run`",
     ".venv/bin/python -m experiments.gate": "takes minutes; tests/gate/test_command.py runs it on small pages",
+    ".venv/bin/deskew edit": "serves until it is ended; tests/editor/test_edit_command.py does that",
+    ".venv/bin/deskew restore scan.npz --stiffness": "takes what was painted; tests/editor/test_desk.py paints it",
     ".venv/bin/pip install --no-deps ./docs/examples/own_method": "tests/experiments/test_own_methods.py installs it",
     ".venv/bin/ray start": "needs machines; tests/experiments/test_ray.py starts a cluster of two nodes",
 }
