@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import typer
 
-from deskew.cli import flattening, restoring, scanning, scoring
+from deskew.cli import accuracy, flattening, importing, restoring, scanning, scoring
 from deskew.cli.printing import say
 from deskew.errors import DeskewError
 
@@ -29,13 +29,14 @@ app = typer.Typer(
 for _command in (
     scanning.calibrate,
     scanning.scan,
-    scanning.accuracy,
+    accuracy.accuracy,
     flattening.flatten,
     restoring.restore,
     restoring.run,
     scoring.score,
 ):
     app.command()(_command)
+app.command("import")(importing.import_captures)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
