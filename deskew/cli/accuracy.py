@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from deskew.cli.metadata import accuracy_record, write_metadata
-from deskew.cli.options import HEIGHTS, JUMP, NEIGHBOUR, CalibrationFile, Gates, Heights, Json, Jump, Neighbour
+from deskew.cli.options import HEIGHTS, JUMP, NEIGHBOUR, CalibrationFile, Gates, Heights, Json, Jump, Mask, Neighbour
 from deskew.cli.printing import depth_figures, report, warn
 from deskew.cli.progress import open_capture
+from deskew.cli.scanning import read_mask
 from deskew.errors import require_positive
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def accuracy(
             "--radius", metavar="PX", help="A corner's depth is that of a plane through so many pixels around."
         ),
     ] = None,
+    mask: Mask = None,
     heights: Heights = HEIGHTS,
     neighbour: Neighbour = NEIGHBOUR,
     jump: Jump = JUMP,
@@ -77,7 +79,7 @@ def accuracy(
         decoded, depth = _measured(capture, folder, devices, gates)
         more: dict[str, float] = {}
         if board is None:
-            deviation = _page_plane(capture, devices, depth)
+            deviation = _page_plane(capture, devices, depth, mask)
         else:
             deviation, more = _board_plane(board, capture, decoded, devices, depth, min_length, radius)
         deviations.append(deviation)
@@ -108,13 +110,18 @@ def _measured(capture: Capture, folder: Path, devices: Calibration, gates: Gates
     return decoded, acquisition.depth_map(devices, decoded, gates.settings())
 
 
-def _page_plane(capture: Capture, devices: Calibration, depth: DepthMap) -> PlaneDeviation:
+def _page_plane(capture: Capture, devices: Calibration, depth: DepthMap, mask: Path | None) -> PlaneDeviation:
     """Deviation of a flat page's points; the desk around it is no part of the plane."""
     import cv2
     import numpy as np
 
-    from deskew import acquisition
+    from deskew import acquisition, restoration
 
+    if mask is not None:
+        page = read_mask(mask, capture.camera_size).astype(np.uint8)
+        return acquisition.plane_deviation(
+            acquisition.depth_points(depth, restoration.undistorted_view(page, devices.camera) > 0)
+        )
     corners = acquisition.page_outline(capture.white, capture.black, devices.camera, depth=depth).corners
     inside = np.zeros(depth.z.shape, np.uint8)
     cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)  # a flat page's outline has four straight sides

@@ -53,6 +53,16 @@ if TYPE_CHECKING:
 _METHOD = "spring"  # a scan that is kept is made for this one, unless the user says how
 
 
+def read_mask(path: Path, size: tuple[int, int]) -> Array:
+    """Read where the page is in the camera's picture, (height, width) bool."""
+    from deskew import io
+
+    picture = io.read_image(path, size)
+    page: Array = (picture if picture.ndim == 2 else picture.max(axis=-1)) > 0
+    require(bool(page.any()), "--mask", "show the page: not black all over", str(path))
+    return page
+
+
 @dataclass(frozen=True, slots=True)
 class Scanning:
     """How a page is to be scanned."""
@@ -75,14 +85,7 @@ class Scanning:
 
     def page(self, size: tuple[int, int]) -> Array | None:
         """Read the mask, (height, width) bool."""
-        if self.mask is None:
-            return None
-        from deskew import io
-
-        picture = io.read_image(self.mask, size)
-        page: Array = (picture if picture.ndim == 2 else picture.max(axis=-1)) > 0
-        require(bool(page.any()), "--mask", "show the page: not black all over", str(self.mask))
-        return page
+        return None if self.mask is None else read_mask(self.mask, size)
 
     def materials(self, size: tuple[int, int]) -> StiffnessMap | None:
         """Read the stiffness map; one of another size than the camera's is refused before the long work."""

@@ -146,8 +146,10 @@ def combined(images: Mapping[str, Array], page: npt.NDArray[np.bool_], how: str)
         Spread over the grey levels by :func:`as_picture`: 16 bits if any of the images has as many, else 8.
     """
     require_combination(how, list(images))
+    depth = np.uint16 if any(image.dtype == np.uint16 for image in images.values()) else np.uint8
+    if depth is np.uint16:  # white is white in 8 bits as in 16
+        images = {name: image * np.uint16(257) if image.dtype == np.uint8 else image for name, image in images.items()}
     every = list(images.values())
-    depth = np.uint16 if any(image.dtype.itemsize > 1 for image in every) else np.uint8
     if how == "components":
         scores = principal_components(every, page).scores
         names = pictures_of(how, list(images))

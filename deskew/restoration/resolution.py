@@ -35,6 +35,8 @@ def pixels_per_unit(camera: Pinhole, page: npt.NDArray[np.bool_]) -> tuple[float
         If the page shows at fewer than three places that are not on one line.
     """
     rows, columns = np.nonzero(page)
+    if len(rows) == 0:
+        raise StepError("The resolution cannot be told: the view does not show the page; move it back into view.")
     kept = slice(None, None, max(1, len(rows) // _STEPS**2))
     pixels = np.stack([columns[kept], rows[kept]], axis=-1).astype(np.float64)
     places: Floats = projection.onto_bed(camera, pixels)

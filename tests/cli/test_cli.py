@@ -201,6 +201,17 @@ def test_a_page_is_scanned_as_its_method_asks_unless_told_otherwise(
     assert steps.calls["scan"]["recipe"] == recipe
 
 
+@pytest.mark.parametrize("line", ["scan page -c c.json -o out/s.npz", "run page -c c.json -o out/r.png"])
+def test_what_is_believed_of_depth_can_be_said(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], line: str
+) -> None:
+    assert run(line, capsys)[0] == 0
+    assert steps.calls["scan"]["gates"] == (DepthSettings(), 12.0)
+    assert run(f"{line} --heights -1500 1500 --neighbour 6 --jump 15 --hole 100", capsys)[0] == 0
+    wanted = DepthSettings(z_min_mm=-1500.0, z_max_mm=1500.0, neighbour_mm=6.0, jump_mm=15.0)
+    assert steps.calls["scan"]["gates"] == (wanted, 100.0)
+
+
 def test_a_scanned_mesh_carries_its_place_in_the_white_image(
     here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
 ) -> None:
