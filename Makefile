@@ -26,7 +26,7 @@ PHYSICAL_full := sheet=physical sheet.drawn=true
 # What a run at this budget may overwrite: smoke proves that it runs and never touches the committed reports.
 REPORTS = $(if $(filter smoke,$(BUDGET)),out/smoke,reports)
 
-.PHONY: setup reproduce $(EXPERIMENTS) bench test lint format lock clean help
+.PHONY: setup reproduce $(EXPERIMENTS) check bench test lint format lock clean help
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -49,6 +49,9 @@ $(EXPERIMENTS): $(STAMP)
 		$(if $(filter %_physical,$@),$(PHYSICAL_$(BUDGET))) \
 		$(if $(filter real_boards,$@),$(if $(REAL_BOARDS),real_boards.path='$(REAL_BOARDS)')) \
 		$(if $(filter ocr_misses,$@),$(if $(REAL_PAGES),ocr.real_path='$(REAL_PAGES)'))
+
+check: $(STAMP) ## the regression gate: the pages of reports/baseline/ by the present code (docs/gate.md)
+	@$(BIN)/python -m experiments.gate --baseline reports/baseline/smoke.csv --junit out/gate.xml
 
 bench: $(STAMP) ## time every stage against a memory triad; writes out/speed/ (TRIALS=15 repeats more)
 	@rm -rf out/speed

@@ -34,6 +34,11 @@ def quantile_table() -> Floats:
     return table
 
 
+def redrawn(seed: int, draw: int) -> int:
+    """Return the noise seed of a draw, in [0, 2**63): the seed itself for draw 0, for others a number of their own."""
+    return seed if draw == 0 else int(np.random.SeedSequence([seed, draw]).generate_state(1, np.uint64)[0]) >> 1
+
+
 @njit(cache=True)
 def run_start(key: int, frame: int, run: int) -> int:
     """Place in the table where the noise of run number `run` of a frame begins: splitmix64's finaliser."""

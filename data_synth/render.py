@@ -9,6 +9,7 @@ import numpy as np
 from data_synth.coded import Coded
 from data_synth.exposure import exposed
 from data_synth.lights import Light, under_lights
+from data_synth.noise import redrawn
 from data_synth.optics import blurred, frame_window, margin_px, psf_taps
 from data_synth.pages import Page
 from data_synth.patterns import default_fringes, projected_lines
@@ -81,6 +82,7 @@ def photograph(
     key = int(seed.integers(1 << 63)) if isinstance(seed, np.random.Generator) else seed
     require(0 <= key < 1 << 63, "seed", "be in [0, 2**63)", key)
     config = rig.config
+    key = redrawn(key, config.noise_draw)
     samples = sample_scene(rig, sheet, page, margin_px(config.camera_psf_sigma_px))
     window = _windows(rig, samples)
     light = np.float32(config.exposure_grey * config.lit) * samples.lit

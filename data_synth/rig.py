@@ -50,6 +50,8 @@ class RigConfig:
         Standard deviation of the noise at no signal [grey levels].
     noise_scale : float
         Factor on the standard deviation of shot and read noise together; 0 leaves the 8-bit rounding alone.
+    noise_draw : int
+        Which draw of that noise, at least 0: another one photographs the same scene with other noise.
     exposures : int
         Exposures that the camera averages into one image, 1 to 256; from two on images have 16 bits. A line sweep takes
         one.
@@ -74,6 +76,7 @@ class RigConfig:
     shot_noise_grey: float = 0.017
     read_noise_grey: float = 0.8
     noise_scale: float = 1.0
+    noise_draw: int = 0
     exposures: int = 1
     late_share_max: float = 0.0
     repeated_share: float = 0.0
@@ -95,6 +98,7 @@ class RigConfig:
         ):
             value = getattr(self, name)
             require(low <= value <= high, name, f"be in [{low}, {high}]", value)
+        require_whole("noise_draw", self.noise_draw, 0, 2**32 - 1)
         require_whole("exposures", self.exposures, 1, 256)
         odd = self.stripe_width_px in range(1, 16, 2)
         require(odd, "stripe_width_px", "be an odd whole number in [1, 15]", self.stripe_width_px)

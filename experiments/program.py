@@ -22,10 +22,9 @@ from omegaconf.errors import OmegaConfBaseException
 from deskew.errors import DeskewError, InputError, StepError
 from experiments.campaign import carry_out_campaign
 from experiments.complaints import one_line, refuse_arguments
+from experiments.composed import CONF
 from experiments.settings import Config
 from experiments.studies import STUDIES, AbsentError
-
-_CONF = Path(__file__).resolve().parents[1] / "conf"
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -38,8 +37,6 @@ def main(arguments: Sequence[str]) -> int:
     """
     codes, crashes = [0], list[Exception]()
     ConfigStore.instance().store("schema", Config)
-    # A sweep's folder cannot wait until `out` is resolved for each job.
-    OmegaConf.register_new_resolver("either", lambda first, second: first or second, replace=True)
 
     def task(config: DictConfig) -> None:
         try:
@@ -50,7 +47,7 @@ def main(arguments: Sequence[str]) -> int:
 
     try:
         with _hydra_raises(arguments):
-            hydra.main(config_path=str(_CONF), config_name="config", version_base="1.3")(task)()
+            hydra.main(config_path=str(CONF), config_name="config", version_base="1.3")(task)()
     except (HydraException, OmegaConfBaseException, ValueError, KeyError, OSError) as error:
         # Hydra raises plain errors too for what it cannot use; a job's own are faults of this program.
         if error in crashes:
@@ -117,7 +114,7 @@ def _hydra_raises(arguments: Sequence[str]) -> Iterator[None]:
     sys.argv = ["experiments", *arguments]
     os.environ["HYDRA_FULL_ERROR"] = "1"
     try:
-        refuse_arguments(_Parser(parents=[get_args_parser()], add_help=False).parse_args(list(arguments)), _CONF)
+        refuse_arguments(_Parser(parents=[get_args_parser()], add_help=False).parse_args(list(arguments)), CONF)
         yield
     finally:
         sys.argv = before

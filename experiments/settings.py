@@ -17,8 +17,10 @@ from deskew.errors import InputError, require
 
 BUDGETS = ("smoke", "paper", "full")
 ENGINES = ("processes", "ray", "serial", "slurm")
-# `${at:${budget.name},A,B,C}` in conf/: what depends on the budget, as `trials` does.
+# In conf/: `${at:${budget.name},A,B,C}` depends on the budget, as `trials` does; `${either:A,B}` is A unless it is
+# empty: a sweep's folder cannot wait until `out` is resolved for each job.
 OmegaConf.register_new_resolver("at", lambda budget, *values: values[BUDGETS.index(budget)], replace=True)
+OmegaConf.register_new_resolver("either", lambda first, second: first or second, replace=True)
 SURFACE_KINDS = ("cylinder", "cone", "folds", "mirror", "physical")
 
 
@@ -123,6 +125,7 @@ class PageSettings(Checked):
 class RigSettings(Checked):
     """The synthetic rig; every key can be swept.
 
+    `noise_draw`: which draw of all its noise; another one photographs the same pages and boards with other noise.
     `camera_blur_px`: standard deviation of the lens's blur.
     `baseline_mm`: distance of projector and camera along X; the projector moves on a circle about where it is aimed.
     `stripe_width_px`: neighbouring projector lines that a frame lights; the blur of the projector's lens stays.
@@ -132,6 +135,7 @@ class RigSettings(Checked):
 
     group: ClassVar[str] = "rig."
     noise_scale: float = number(1.0, 0.0, 10.0, "times the rig's own noise")
+    noise_draw: int = count(0, 0, 2**32 - 1)
     camera_blur_px: float = number(0.75, 0.3, 3.0, "camera pixels")
     baseline_mm: float = number(426.0, 100.0, 700.0, "mm")
     stripe_width_px: int = setting(

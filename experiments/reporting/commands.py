@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
-from hydra import compose, initialize_config_dir
-from hydra.core.config_store import ConfigStore
-from omegaconf import OmegaConf
-
-from experiments.settings import Config
+from experiments.composed import composed
 from experiments.trials.plan import settings_of
 
-_CONF = Path(__file__).resolve().parents[2] / "conf"
 _GIVEN = "sha256 of "
 
 
@@ -32,19 +26,10 @@ def command(run: Mapping[str, Any], trials: int, out: str) -> str:
     """
     found, experiment = run["config"], run["experiment"]
     keys = {"seed": found["seed"], "trials": trials}
-    keys |= dict(_changed(found, settings_of(_defaults(experiment), {})))
+    keys |= dict(_changed(found, settings_of(composed([f"experiment={experiment}"]), {})))
     given = [name.removeprefix(_GIVEN) for name in found if name.startswith(_GIVEN)]
     parts = [f"experiment={experiment}", *(_assigned(key, value) for key, value in keys.items())]
     return " ".join(["python -m experiments", *parts, *(f"{key}=FOLDER" for key in given), f"out={out}"])
-
-
-def _defaults(experiment: str) -> Config:
-    ConfigStore.instance().store("schema", Config)
-    OmegaConf.register_new_resolver("either", lambda first, second: first or second, replace=True)
-    with initialize_config_dir(str(_CONF), version_base="1.3"):
-        config = OmegaConf.to_object(compose("config", [f"experiment={experiment}"]))
-    assert isinstance(config, Config)
-    return config
 
 
 def _changed(found: Mapping[str, Any], defaults: Mapping[str, Any], group: str = "") -> Iterator[tuple[str, Any]]:

@@ -54,6 +54,7 @@ def configured_rig(settings: RigSettings) -> Rig:
     rig = data_synth.default_rig(settings.noise_scale, baseline_mm=settings.baseline_mm)
     config = replace(
         rig.config,
+        noise_draw=settings.noise_draw,
         camera_psf_sigma_px=settings.camera_blur_px,
         stripe_width_px=settings.stripe_width_px,
         projector_gamma=settings.gamma,

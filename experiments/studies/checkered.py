@@ -11,7 +11,7 @@ from deskew import metrics, restoration
 from deskew.types import Array, Capture, DepthMap, Dewarped, Floats, Pinhole, Restoration, Scan
 from experiments.studies.flattened import flattening_figures
 from experiments.studies.placed import Placed, board_corners
-from experiments.studies.views import DETECTORS, Detector, restored_corners, seen_corners
+from experiments.studies.views import DETECTORS, Detector, map_error_mm, restored_corners, seen_corners
 from experiments.trials import Recorder, reason_of
 
 PAPER_PX, PAPER_MM = 0.5, 0.25
@@ -70,7 +70,10 @@ class CheckeredPage:
     def measure_unrestored(self, capture: Capture, condition: str = "unrestored") -> Array:
         """Measure the bent page as it is; return its undistorted view."""
         image = restoration.undistorted_view(capture.white, self.camera)
-        self._compare(condition, "-", image, seen_corners(self.truth, self.corners_mm, self.camera, self.view))
+        seeds = seen_corners(self.truth, self.corners_mm, self.camera, self.view)
+        for name, detect in self.detectors.items():
+            with self.record.attempt(f"{condition}{name}", "-"):
+                self._compare(f"{condition}{name}", "-", detect(image, seeds), self.control[name])
         return image
 
     def measure_restored(self, condition: str, method: str, scan: Scan, restored: Restoration) -> None:
@@ -84,7 +87,13 @@ class CheckeredPage:
             self.fail(condition, method, error)
             return
         self.record.add(condition, method, figures)
-        self._compare(condition, method, restored.image, restored_corners(uv, self.corners_mm))
+        seeds = restored_corners(uv, self.corners_mm)
+        for name, detect in self.detectors.items():
+            with self.record.attempt(f"{condition}{name}", method):
+                found = detect(restored.image, seeds)
+                self._compare(f"{condition}{name}", method, found, self.control[name])
+                apart = map_error_mm(uv, found, self.corners_mm)
+                self.record.add(f"{condition}{name}", method, {"picture_to_map_rms_mm": apart})
 
     def measure_dewarped(self, condition: str, method: str, dewarped: Dewarped) -> Array | None:
         """Record what is measured on a picture that was flattened by itself; return it in the control's frame.
@@ -125,12 +134,9 @@ class CheckeredPage:
         for name in self.detectors:
             self.record.fail(f"{condition}{name}", method, reason_of(error))
 
-    def _compare(self, condition: str, method: str, image: Array, seeds: Floats) -> None:
-        for name, detect in self.detectors.items():
-            with self.record.attempt(f"{condition}{name}", method):
-                found = detect(image, seeds)
-                distance = metrics.corner_distance(found, self.control[name], self.view)
-                self.record.add(f"{condition}{name}", method, distance | _kept(distance))
+    def _compare(self, condition: str, method: str, found: Floats, control: Floats) -> None:
+        distance = metrics.corner_distance(found, control, self.view)
+        self.record.add(condition, method, distance | _kept(distance))
 
 
 def _kept(distance: Mapping[str, float]) -> dict[str, float]:

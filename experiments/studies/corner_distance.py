@@ -71,6 +71,7 @@ class CornerDistance(Study):
             Column("dense_similar_mean_mm", "dense similar mean [mm]", 3),
             Column("page_coverage", "coverage", 4, headline=True),
             Column("detector_rms_px", "detector RMS [px]", 3, headline=True),
+            Column("picture_to_map_rms_mm", "picture to map [mm]", 3),
             Column("corners_missing", "missing", 0, headline=True),
             Column("corners_expected", "expected", 0),
             Column("at_rest", "at rest", headline=True, share=True),

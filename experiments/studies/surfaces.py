@@ -105,7 +105,11 @@ class Surfaces(Study):
         mesh, bent = _mesh(config, key, rng)
         record.add(key.condition, "-", {"vertices": len(mesh.vertices)} | bent)
         scanned = mesh.vertices.copy()
-        scanned[:, 2] += rng.normal(0.0, config.surfaces.noise_mm, len(scanned))
+        bits = rng.bit_generator
+        assert isinstance(bits, np.random.PCG64)
+        # The stream goes on at another place for another draw: the surface stays, its noise does not.
+        noise = np.random.Generator(bits.jumped(config.rig.noise_draw))
+        scanned[:, 2] += noise.normal(0.0, config.surfaces.noise_mm, len(scanned))
         for method in config.methods:
             with record.attempt(key.condition, method):
                 function = method_of(config, method)

@@ -110,6 +110,7 @@ def test_skewed_devices_are_refused() -> None:
     ("name", "value"),
     [
         ("noise_scale", -1.0),
+        ("noise_draw", -1),
         ("projector_code", 0),
         ("camera_psf_sigma_px", 0.1),
         ("desk_albedo", 1.5),

@@ -72,6 +72,24 @@ def test_photographs_have_the_noise_of_the_model() -> None:
             assert difference[inside].var() / 2 == pytest.approx(wanted, rel=0.12)
 
 
+def test_another_draw_is_the_same_scene_with_other_noise_of_the_same_strength() -> None:
+    config = ds.RigConfig()
+    rigs = [replace(ds.default_rig(), config=replace(config, noise_draw=draw)) for draw in (0, 7, 8)]
+    # One generator each, as a trial has it: what it draws later must not depend on the draw of the noise.
+    generators = [np.random.default_rng(5) for _ in rigs]
+    captures = [
+        ds.photograph(rig, ds.flat_sheet(), ds.Checkerboard(), rng) for rig, rng in zip(rigs, generators, strict=True)
+    ]
+    assert len({int(rng.integers(1 << 60)) for rng in generators}) == 1
+    plain = ds.photograph(ds.default_rig(), ds.flat_sheet(), ds.Checkerboard(), np.random.default_rng(5))
+    assert np.array_equal(captures[0].white, plain.white)
+    for image, variance in (("black", 0.64 + 0.017 * captures[0].black.mean()), ("white", None)):
+        images = [getattr(capture, image).astype(float) for capture in captures]
+        differences = [(images[i] - images[j]).var() / 2 for i, j in ((0, 1), (1, 2), (2, 0))]
+        assert max(differences) < 1.02 * min(differences)
+        assert variance is None or differences[0] == pytest.approx(variance + 1 / 12, rel=0.05)
+
+
 def test_silence_leaves_rounding_alone() -> None:
     assert np.unique(exposures(99.4, 3, scale=0.0)).tolist() == [99.0]
     assert np.unique(exposures(300.0, 1, scale=0.0)).tolist() == [255.0]

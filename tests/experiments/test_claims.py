@@ -50,7 +50,13 @@ def plant(folder: Path, report: str, *planted: Planted, backwards: bool = False)
             writer = csv.writer(file)
             writer.writerow([item.name for item in fields(Row)])
             writer.writerows(row.cells() for row in rows if row.metric.startswith("seconds_") == times)
-    run = {"experiment": report, "config": {"seed": 3}, "failures": [], "commit": "0123456789abcdef", "machine": {}}
+    run = {
+        "experiment": "plane_accuracy",
+        "config": {"seed": 3},
+        "failures": [],
+        "commit": "0123456789abcdef",
+        "machine": {},
+    }
     (folder / report / "run.json").write_text(json.dumps(run))
     return Evidence(folder)
 
@@ -215,9 +221,8 @@ def test_the_page_says_claim_figure_verdict_and_how_to_repeat_it(tmp_path: Path)
     assert "> It is good. (section 4.1)" in page
     assert "Reproduced if the whole interval is at most 1, exceeded if it is below 0.5." in page
     assert "**Why.** It was 0.7 (0.6..0.8), and (not measured)." in page
-    assert (
-        "[planes](planes/table.md) by `python -m experiments experiment=planes seed=3 trials=3 out=out/planes`" in page
-    )
+    command = "python -m experiments experiment=plane_accuracy seed=3 trials=3 out=out/planes"
+    assert f"[planes](planes/table.md) by `{command}`" in page
     assert "| [planes](planes/table.md) | 3 | 3 | 0 | 0123456789 | unknown |" in page
 
 

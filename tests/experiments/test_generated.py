@@ -10,15 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hydra import compose, initialize_config_dir
-from hydra.core.config_store import ConfigStore
 from hypothesis import given
 from hypothesis import strategies as st
-from omegaconf import OmegaConf
 from scipy import stats
 
 from data_synth import BOARD, Checkerboard
 from deskew.errors import InputError
+from experiments.composed import composed
 from experiments.reporting import generated
 from experiments.reporting.artifact import minutes, with_artifact
 from experiments.reporting.beside import nulls, real
@@ -27,7 +25,6 @@ from experiments.reporting.claims.measures import Evidence, Values
 from experiments.reporting.commands import command
 from experiments.reporting.expectations import EXPECTED, rerun_interval
 from experiments.reporting.export import csv_text
-from experiments.settings import Config
 from experiments.studies.real_boards import BOARD as REAL_BOARD
 from experiments.trials import Row, TrialKey
 from experiments.trials.plan import settings_of
@@ -119,12 +116,7 @@ def test_one_trial_foretells_nothing() -> None:
 
 def settings(overrides: list[str]) -> dict[str, Any]:
     """What run.json says of a run with these arguments."""
-    ConfigStore.instance().store("schema", Config)
-    OmegaConf.register_new_resolver("either", lambda first, second: first or second, replace=True)
-    with initialize_config_dir(str(generated.ROOT / "conf"), version_base="1.3"):
-        config = OmegaConf.to_object(compose("config", overrides))
-    assert isinstance(config, Config)
-    return settings_of(config, {})
+    return settings_of(composed(overrides), {})
 
 
 @pytest.mark.parametrize(

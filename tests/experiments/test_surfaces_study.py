@@ -112,6 +112,17 @@ def test_noise_is_each_trials_own_and_unknown_to_the_score(here: Path) -> None:
     assert Path("out/results.csv").read_bytes() == first
 
 
+def test_another_draw_of_the_noise_is_on_the_same_surface(here: Path) -> None:
+    meshes, noisy = [], []
+    for draw in (0, 3):
+        overrides = ["surfaces.paths=[a.obj]", "surfaces.noise_mm=0.3", f"rig.noise_draw={draw}"]
+        assert run(*overrides, methods=("unroll",)) == 0
+        meshes.append(read()["flattened/a", "-", 0])
+        noisy.append(read()["flattened/a", "unroll", 0]["noise_estimated_mm"])
+    assert meshes[0] == meshes[1]
+    assert noisy[0] != noisy[1]
+
+
 def test_a_renamed_file_is_another_row_and_a_moved_one_the_same(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("surfaces.paths=[a.obj]", methods=("unroll",)) == 0
     (here / "moved").mkdir()

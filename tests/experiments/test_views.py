@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter
 
 from deskew import acquisition
 from deskew.types import Array
-from experiments.studies.views import DETECTORS, reflectance
+from experiments.studies.views import DETECTORS, map_error_mm, reflectance
 
 CORNER = np.array([[40.3, 35.8]])
 
@@ -41,3 +41,14 @@ def test_shading_edges_pull_corners_less_in_logarithms() -> None:
 def test_reflectance_does_not_know_how_bright_the_light_is() -> None:
     image = corner(1.0, 0.0)
     assert np.allclose(reflectance(image), reflectance(3.0 * image))
+
+
+def test_a_picture_read_half_a_pixel_beside_its_map_is_so_far_from_it() -> None:
+    """On a sheared map, with a corner off the page and one not found, which say nothing."""
+    y, x = np.mgrid[0:60, 0:80].astype(float)
+    uv = np.stack([0.5 * x + 0.1 * y, 0.5 * y], axis=-1)
+    uv[:, 70:] = np.nan
+    pixels = np.array([[10.25, 20.5], [33.0, 41.75], [75.0, 10.0], [np.nan, np.nan]])
+    corners = np.stack([0.5 * pixels[:, 0] + 0.1 * pixels[:, 1], 0.5 * pixels[:, 1]], axis=-1)
+    assert map_error_mm(uv, pixels, corners) < 1e-9
+    assert map_error_mm(uv, pixels + 0.5, corners) == pytest.approx(np.hypot(0.3, 0.25))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from experiments.reporting.claims.claim import Claim, Line
 from experiments.reporting.claims.measures import Evidence, Measure, MissingError
 from experiments.reporting.claims.paper import UNTESTED
 from experiments.reporting.claims.rules import Figure, Rule, Verdict
+from experiments.reporting.commands import command
 from experiments.reporting.markdown import markdown_table
 
 _NONE = "–"
@@ -32,9 +33,6 @@ A verdict follows from the rule that stands beside each figure below:
 - **not tested**: the report that would tell is missing, or has no such rows.
 
 Where the paper has words and no figure, the rule says what they were taken to mean."""
-
-# How a report is made that is not called like its experiment.
-_KEYS: Mapping[str, str] = {"corner_distance_physical": "sheet=physical"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,10 +171,8 @@ def _reports_of(claim: Claim, evidence: Evidence) -> list[str]:
 
 
 def _command(report: str, evidence: Evidence) -> str:
-    """Return the command that makes a report like the one that is there."""
-    run = evidence.run(report)
-    keys = [f"experiment={run['experiment']}", f"seed={run['config']['seed']}", f"trials={evidence.n_trials(report)}"]
-    return " ".join(["python -m experiments", *keys, *filter(None, [_KEYS.get(report)]), f"out=out/{report}"])
+    """Return the command that makes a report again."""
+    return command(evidence.run(report), evidence.n_trials(report), f"out/{report}")
 
 
 def _reports(claims: Sequence[Claim], evidence: Evidence) -> str:
