@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
-from deskew.io import png
+from deskew.io import pngtags
 from deskew.io.files import read_head
 
 MAX_PROFILE_BYTES = 1 << 22
@@ -33,5 +33,5 @@ def read_profile(path: Path) -> bytes | None:
         If the file is missing or unreadable.
     """
     head = read_head(path, 2 * MAX_PROFILE_BYTES)  # the profile comes before the pixels
-    found = png.profile(head, MAX_PROFILE_BYTES)
-    return found if found is not None and is_profile(found, png.n_channels(head)) else None
+    found = pngtags.profile(head, MAX_PROFILE_BYTES)
+    return found if found is not None and is_profile(found, pngtags.n_channels(head)) else None

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from deskew.errors import InputError, require
-from deskew.io import png, tiff
+from deskew.io import png, pngtags, tiff
 from deskew.io.colour import is_profile
 from deskew.io.files import read_bytes, read_head, write_bytes
 from deskew.types import Array, Size
@@ -146,7 +146,7 @@ def picture_bytes(
     require(fits, "profile", f"be the ICC profile of a picture with {channels} channels", "another")
     finite = dpi is None or all(math.isfinite(value) and value > 0 for value in dpi)
     require(finite, "dpi", "be two finite numbers above 0", dpi)
-    tagged = png.tagged if suffix == ".png" else tiff.tagged
+    tagged = pngtags.tagged if suffix == ".png" else tiff.tagged
     return tagged(data, profile, dpi)
 
 

@@ -82,7 +82,6 @@ def essential(data: bytes, name: str) -> bytes:
     """Return the same picture with nothing but the chunks that make its pixels, all verified.
 
     Colour profiles and text never reach the decoder: it would complain of common harmless faults in them on stderr.
-    What a profile says is kept apart from the pixels (:mod:`deskew.io.colour`).
 
     Raises
     ------
@@ -100,60 +99,8 @@ def essential(data: bytes, name: str) -> bytes:
     sound = len(kept[1][1]) % 3 == 0 and 3 <= len(kept[1][1]) <= 768 if palette else not indexed
     require(sound, name, "have a valid palette", "none" if not palette else f"{len(kept[1][1])} bytes")
     _require_all_pixels(kept[0][1], b"".join(body for kind, body in kept if kind == b"IDAT"), name)
-    return SIGNATURE + b"".join(_chunk(kind, body) for kind, body in kept if kind != b"PLTE" or indexed)
-
-
-def _chunk(kind: bytes, body: bytes) -> bytes:
-    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-
-
-def n_channels(data: bytes) -> int:
-    """Channels of the picture that a whole header announces: 1 grey, 3 colour; transparency does not count."""
-    return 3 if data[25] & 2 else 1
-
-
-def profile(data: bytes, limit: int) -> bytes | None:
-    """Return what the chunk iCCP before the pixels unpacks to, None if there is none, damaged or above `limit` bytes.
-
-    Parameters
-    ----------
-    data : bytes
-        The beginning of a PNG, at least up to its pixels.
-    limit : int
-        Largest profile [bytes].
-    """
-    at = len(SIGNATURE)
-    while at + 12 <= len(data):
-        (length,) = struct.unpack_from(">I", data, at)
-        kind, body = data[at + 4 : at + 8], data[at + 8 : at + 8 + length]
-        if kind in (b"IDAT", b"IEND"):
-            break
-        if kind == b"iCCP":
-            _, _, packed = body.partition(b"\0")  # a name, a null, the method 0, then the profile
-            inflater = zlib.decompressobj()
-            try:
-                found = inflater.decompress(packed[1:], limit) if packed[:1] == b"\0" else b""
-            except zlib.error:
-                return None
-            return found if inflater.eof else None
-        at += 12 + length
-    return None
-
-
-def tagged(data: bytes, icc: bytes | None, dpi: tuple[float, float] | None) -> bytes:
-    """Return a whole PNG with a colour profile (iCCP) and its resolution (pHYs) before its pixels.
-
-    Parameters
-    ----------
-    data : bytes
-        As an encoder wrote it, its header first.
-    icc : bytes or None
-        The profile.
-    dpi : (x, y) or None
-        Dots per inch; PNG keeps whole dots a metre.
-    """
-    extra = b"" if icc is None else _chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(icc, 9))
-    if dpi is not None:
-        per_metre = [min(max(1, round(value / 0.0254)), (1 << 31) - 1) for value in dpi]
-        extra += _chunk(b"pHYs", struct.pack(">IIB", *per_metre, 1))
-    return data[:33] + extra + data[33:]
+    return SIGNATURE + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in kept
+        if kind != b"PLTE" or indexed
+    )
