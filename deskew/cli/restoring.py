@@ -229,7 +229,9 @@ def restore_page(
     figures: dict[str, Any] = {"restored": [str(path) for path in paths.values()], "method": method}
     if len(paths) == 1:
         figures["restored"] = str(wanted.output)
-    figures |= _named_dpi(dpi) | flattened_figures(restored.flattened, "page")
+    figures |= (
+        _named_dpi(dpi) | {"filled_fraction": found.filled_fraction} | flattened_figures(restored.flattened, "page")
+    )
     for light, fit in restored.registrations.items():
         figures |= {f"{light}_scale": fit.scale.tolist(), f"{light}_offset_px": fit.offset.tolist()}
         figures[f"{light}_residual_px"] = fit.residual_px

@@ -232,6 +232,7 @@ def test_run_goes_from_a_folder_to_a_page(here: Path, steps: StandIn, capsys: py
     assert figures == {
         "restored": "out/r.tif",
         "method": "paper_rk4",
+        "filled_fraction": 0.0,
         "status": "at_rest",
         "steps": 7,
         "spring_energy": None,
