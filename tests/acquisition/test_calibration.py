@@ -195,10 +195,10 @@ def test_a_board_whose_pixels_are_all_wrong_is_outvoted_and_told(shift_px):
 
 
 def test_the_same_boards_give_the_same_bytes_on_any_number_of_threads():
-    views, before = _views(0.3, 0.1, 100, 4), cv2.getNumThreads()
+    views, before = _views(0.3, 0.1, 100, 3), cv2.getNumThreads()
     found = set()
     try:
-        for n in (1, 4, 4):
+        for n in (1, 4, 4, 4, 4, 4):
             cv2.setNumThreads(n)
             devices = calibrate(BOARD, views)
             found.add(devices.camera.K.tobytes() + devices.projector.K.tobytes())
