@@ -26,7 +26,7 @@ PHYSICAL_full := sheet=physical sheet.drawn=true
 # What a run at this budget may overwrite: smoke proves that it runs and never touches the committed reports.
 REPORTS = $(if $(filter smoke,$(BUDGET)),out/smoke,reports)
 
-.PHONY: setup reproduce $(EXPERIMENTS) check bench test lint format lock clean help
+.PHONY: setup reproduce $(EXPERIMENTS) check report bench test lint format lock clean help
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -52,6 +52,9 @@ $(EXPERIMENTS): $(STAMP)
 
 check: $(STAMP) ## the regression gate: the pages of reports/baseline/ by the present code (docs/gate.md)
 	@$(BIN)/python -m experiments.gate --baseline reports/baseline/smoke.csv --junit out/gate.xml
+
+report: $(STAMP) ## write out/report.html, the report for people: one file, offline
+	@$(BIN)/python -m experiments.page
 
 bench: $(STAMP) ## time every stage against a memory triad; writes out/speed/ (TRIALS=15 repeats more)
 	@rm -rf out/speed

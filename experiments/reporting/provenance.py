@@ -29,6 +29,7 @@ def provenance(experiment: str, settings: Mapping[str, Any], fingerprint: str) -
     return {
         "experiment": experiment,
         "commit": _git("rev-parse", "HEAD") or "unknown",
+        "commit_date": _git("show", "--no-patch", "--format=%cs", "HEAD") or "unknown",
         "changed_since_commit": bool(_git("status", "--porcelain", "--", "*.py", "*.yaml")),
         "config": dict(settings),
         "config_hash": fingerprint,

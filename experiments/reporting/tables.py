@@ -7,8 +7,9 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from statistics import median
 
+from experiments.reporting.blocks import Block, Heading, Note, Table, markdown_page
 from experiments.reporting.layout import Column, Layout, Section, Times
-from experiments.reporting.markdown import NONE, markdown_table, share, with_interval
+from experiments.reporting.markdown import NONE, share, with_interval
 from experiments.reporting.pages import Place, PlacePages, pages_by_place
 from experiments.reporting.statistics import share_interval, summarise
 from experiments.reporting.tails import tails_table
@@ -29,7 +30,14 @@ _OF_FEW = (
 
 
 def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timings: Sequence[Row] = ()) -> str:
-    """Return the text of `table.md`.
+    """Return the text of `table.md`; parameters as of :func:`table_blocks`."""
+    return markdown_page(table_blocks(layout, rows, failures, timings))
+
+
+def table_blocks(
+    layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timings: Sequence[Row] = ()
+) -> list[Block]:
+    """Return the parts of a study's page of tables.
 
     Parameters
     ----------
@@ -43,29 +51,29 @@ def table(layout: Layout, rows: Sequence[Row], failures: Sequence[Failure], timi
         Shown where the layout asks for times.
     """
     places = pages_by_place(rows)
-    parts = [f"# {layout.title}", layout.note]
+    parts: list[Block] = [Heading(layout.title, 1), Note(layout.note)]
     for times in layout.times:
-        parts += [f"## {times.title}", times.note, _times(times, timings)]
+        parts += [Heading(times.title), Note(times.note), _times(times, timings)]
     parts += _summary(layout, places)
     for tails in layout.tails:
         spread = tails_table(tails, layout.columns, places)
-        parts += [] if spread is None else [f"## {tails.title}", tails.note, spread]
+        parts += [] if spread is None else [Heading(tails.title), Note(tails.note), spread]
     parts += _comparisons(layout, places)
     if not layout.sections and len({row.trial for row in rows}) <= _MAX_TRIALS_SHOWN:
-        parts += ["## Each trial", _each_trial(layout, rows)]
-    parts += ["## All trials", _all_trials(layout, places)]
+        parts += [Heading("Each trial"), _each_trial(layout, rows)]
+    parts += [Heading("All trials"), _all_trials(layout, places)]
     if failures:
         lines = [[str(f.trial), str(f.seed), f.condition, f.method, f.reason.replace("|", "/")] for f in failures]
-        parts += ["## Failed", markdown_table(("trial", "seed", "condition", "method", "reason"), lines)]
-    return "\n\n".join(parts) + "\n"
+        parts += [Heading("Failed"), Table(("trial", "seed", "condition", "method", "reason"), lines)]
+    return parts
 
 
 def times_page(times: Times, timings: Sequence[Row]) -> str:
     """Return a table of times as a page of its own."""
-    return "\n\n".join((f"# {times.title}", times.note, _times(times, timings))) + "\n"
+    return markdown_page([Heading(times.title, 1), Note(times.note), _times(times, timings)])
 
 
-def _times(times: Times, timings: Sequence[Row]) -> str:
+def _times(times: Times, timings: Sequence[Row]) -> Table:
     """Return a line a condition and method; of several trials the median."""
     metrics = [column.metric for column in times.columns]
     found = [
@@ -79,34 +87,35 @@ def _times(times: Times, timings: Sequence[Row]) -> str:
         for place, values in found
         if values[0] is not None
     ]
-    return markdown_table(("condition", "method", *(column.heading for column in times.columns)), lines)
+    headings = "condition", "method", *(column.heading for column in times.columns)
+    return Table(headings, lines, of_columns=("", "", *metrics))
 
 
-def _summary(layout: Layout, places: Mapping[Place, PlacePages]) -> list[str]:
+def _summary(layout: Layout, places: Mapping[Place, PlacePages]) -> list[Block]:
     headlines = [column for column in layout.columns if column.headline]
     if not headlines and not layout.sections:
         return []
     few = any(len(pages.of(metric)) < _FEW for pages in places.values() for metric in pages.values)
-    parts = ["## Summary", _HOW_TO_READ + (_OF_FEW if few else "")]
+    parts: list[Block] = [Heading("Summary"), Note(_HOW_TO_READ + (_OF_FEW if few else ""))]
     if headlines:
         parts.append(_headlines(headlines, places))
     for section in layout.sections:
-        parts += [f"**{section.title}.** {section.note}", _section(layout, section, places)]
+        parts += [Note(f"**{section.title}.** {section.note}"), _section(layout, section, places)]
     return parts
 
 
-def _section(layout: Layout, section: Section, places: Mapping[Place, PlacePages]) -> str:
+def _section(layout: Layout, section: Section, places: Mapping[Place, PlacePages]) -> Block:
     """Return a part of the summary: its own conditions in their order, and those of its columns that have data."""
     ranks = {place: section.rank(place[0]) for place in places}
     shown = {place: pages for place, pages in places.items() if ranks[place] is not None}
     if not shown and section.absent:
-        return section.absent
+        return Note(section.absent)
     measured = {metric for pages in shown.values() for metric in pages.values}
     columns = [column for column in layout.columns if column.metric in measured.intersection(section.metrics)]
     return _headlines(columns, dict(sorted(shown.items(), key=lambda item: ranks[item[0]] or 0)))
 
 
-def _headlines(columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> str:
+def _headlines(columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> Table:
     """Return a line a condition and method (if there are any), a column a metric, the paper's figures below."""
     lines = []
     for (condition, method), pages in places.items():
@@ -119,9 +128,10 @@ def _headlines(columns: Sequence[Column], places: Mapping[Place, PlacePages]) ->
     if set(paper) != {NONE}:
         lines.append(["the paper", NONE, NONE, NONE, *paper])
     headings = ["condition", "method", "n", "failed", *(column.heading for column in columns)]
+    metrics = ["", "", "", "", *(column.metric for column in columns)]
     if all(method == "-" for _, method in places):
-        headings, *lines = ([line[0], *line[2:]] for line in (headings, *lines))
-    return markdown_table(headings, lines)
+        headings, metrics, *lines = ([line[0], *line[2:]] for line in (headings, metrics, *lines))
+    return Table(headings, lines, of_columns=metrics)
 
 
 def _headline(column: Column, values: Sequence[float], n_failed: int) -> str:
@@ -138,7 +148,7 @@ def _headline(column: Column, values: Sequence[float], n_failed: int) -> str:
     return with_interval(math.sqrt(found.mean), ends, column.digits)
 
 
-def _comparisons(layout: Layout, places: Mapping[Place, PlacePages]) -> list[str]:
+def _comparisons(layout: Layout, places: Mapping[Place, PlacePages]) -> list[Block]:
     """Return the sections that compare by page."""
     found = []
     if layout.versus is not None:
@@ -146,15 +156,15 @@ def _comparisons(layout: Layout, places: Mapping[Place, PlacePages]) -> list[str
         found.append((title, layout.versus.note, method_against_method(layout.versus, layout.columns, places)))
     for changes in layout.changes:
         found.append((changes.title, changes.note, condition_against_condition(changes, layout.columns, places)))
-    parts: list[str] = []
-    for title, note, text in found:
-        if text is not None:
+    parts: list[Block] = []
+    for title, note, compared in found:
+        if compared is not None:
             # Said once, above the first of them.
-            parts += [f"## {title}", note if parts else f"{note} {HOW_TO_READ}".strip(), text]
+            parts += [Heading(title), Note(note if parts else f"{note} {HOW_TO_READ}".strip()), compared]
     return parts
 
 
-def _each_trial(layout: Layout, rows: Sequence[Row]) -> str:
+def _each_trial(layout: Layout, rows: Sequence[Row]) -> Table:
     cells: dict[tuple[str, str, int, int], dict[str, float]] = defaultdict(dict)
     for row in rows:
         cells[row.condition, row.method, row.trial, row.seed][row.metric] = row.value
@@ -164,7 +174,8 @@ def _each_trial(layout: Layout, rows: Sequence[Row]) -> str:
         for (condition, method, trial, _), found in sorted(cells.items())
         if "failed" in found or any(column.metric in found for column in shown)
     ]
-    return markdown_table(("condition", "method", "trial", *(column.heading for column in shown)), lines)
+    headings = "condition", "method", "trial", *(column.heading for column in shown)
+    return Table(headings, lines, of_columns=("", "", "", *(column.metric for column in shown)))
 
 
 def _cell(found: dict[str, float], column: Column) -> str:
@@ -173,18 +184,20 @@ def _cell(found: dict[str, float], column: Column) -> str:
     return "failed" if "failed" in found else NONE
 
 
-def _all_trials(layout: Layout, places: Mapping[Place, PlacePages]) -> str:
-    lines = []
+def _all_trials(layout: Layout, places: Mapping[Place, PlacePages]) -> Table:
+    lines, metrics = [], list[str]()
     for (condition, method), pages in places.items():
         n_failed = len(pages.failed)
         named = [column for column in layout.columns if column.metric in pages.values]
         lines += [
             [condition, method, *_spread(column, pages.of(column.metric), n_failed, condition)] for column in named
         ]
+        metrics += [column.metric for column in named]
         if n_failed and not named:
             lines.append([condition, method, NONE, "0", str(n_failed), *[NONE] * 7])
+            metrics.append("")
     headings = ["condition", "method", "metric", "n", "failed", "mean", "95 % of mean"]
-    return markdown_table([*headings, "median", "min", "9 in 10 below", "max", "paper"], lines)
+    return Table([*headings, "median", "min", "9 in 10 below", "max", "paper"], lines, of_lines=metrics)
 
 
 def _spread(column: Column, values: Sequence[float], n_failed: int, condition: str) -> list[str]:

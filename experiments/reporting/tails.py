@@ -6,15 +6,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from experiments.reporting.blocks import Table
 from experiments.reporting.layout import Column, Tails, named_by
-from experiments.reporting.markdown import NONE, markdown_table, share
+from experiments.reporting.markdown import NONE, share
 from experiments.reporting.pages import Place, PlacePages
 from experiments.reporting.statistics import quantile_interval
 
 _QUANTILES = (("half of the pages below", 0.5), ("9 in 10 below", 0.9), ("19 in 20 below", 0.95))
 
 
-def tails_table(tails: Tails, columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> str | None:
+def tails_table(tails: Tails, columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> Table | None:
     """Return a line a condition, method and metric with its quantiles; None without data.
 
     Parameters
@@ -27,7 +28,7 @@ def tails_table(tails: Tails, columns: Sequence[Column], places: Mapping[Place, 
         All results.
     """
     by_metric = {column.metric: column for column in columns}
-    lines = []
+    lines, metrics = [], list[str]()
     for wanted in tails.conditions:
         for (condition, method), pages in places.items():
             ones = pages.of(tails.share)
@@ -38,8 +39,9 @@ def tails_table(tails: Tails, columns: Sequence[Column], places: Mapping[Place, 
             for column in (by_metric[metric] for metric in tails.metrics):
                 cells = _quantiles(pages.of(column.metric), column.digits)
                 lines.append([condition, method, column.heading, kept, *cells])
+                metrics.append(column.metric)
     headings = ["condition", "method", "figure", by_metric[tails.share].heading, *(text for text, _ in _QUANTILES)]
-    return markdown_table([*headings, "largest"], lines) if lines else None
+    return Table([*headings, "largest"], lines, of_lines=metrics) if lines else None
 
 
 def _quantiles(values: Sequence[float], digits: int) -> list[str]:

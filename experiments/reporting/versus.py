@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from experiments.reporting.blocks import Table
 from experiments.reporting.layout import Changes, Column, Versus, named_by
-from experiments.reporting.markdown import NONE, markdown_table, share, with_interval
+from experiments.reporting.markdown import NONE, share, with_interval
 from experiments.reporting.pages import Place, PlacePages
 from experiments.reporting.statistics import Comparison, compare
 
@@ -62,10 +63,12 @@ def paired(one: PlacePages, other: PlacePages, metric: str) -> Paired:
     return Paired(found, len(one.failed), len(other.failed))
 
 
-def method_against_method(versus: Versus, columns: Sequence[Column], places: Mapping[Place, PlacePages]) -> str | None:
+def method_against_method(
+    versus: Versus, columns: Sequence[Column], places: Mapping[Place, PlacePages]
+) -> Table | None:
     """Return a table with a line a condition, method and metric; None if no two methods can be compared."""
     asked = [column for column in columns if column.metric in versus.metrics]
-    lines = []
+    lines, metrics = [], list[str]()
     for wanted in versus.conditions:
         for (condition, method), one in places.items():
             other = places.get((condition, versus.baseline))
@@ -78,13 +81,14 @@ def method_against_method(versus: Versus, columns: Sequence[Column], places: Map
                 equal = str(pair.found.n_equal) if pair.found is not None else NONE
                 cells = [*pair.counts(), pair.difference(column.digits), *pair.verdict(), equal]
                 lines.append([condition, method, column.heading, *cells])
+                metrics.append(column.metric)
     headings = ["condition", "method", "figure", "pages", "failed (against)", "difference", "ratio of means"]
-    return markdown_table([*headings, "better on", "equal on"], lines) if lines else None
+    return Table([*headings, "better on", "equal on"], lines, of_lines=metrics) if lines else None
 
 
 def condition_against_condition(
     changes: Changes, columns: Sequence[Column], places: Mapping[Place, PlacePages]
-) -> str | None:
+) -> Table | None:
     """Return a table with a line a pair and method, a column a metric; None if there is nothing to compare."""
     shown = [next(column for column in columns if column.metric == metric) for metric in changes.metrics]
     lines = []
@@ -97,9 +101,10 @@ def condition_against_condition(
         return None
     headings = ["condition", "against", "method", "pages", "failed (against)", *(column.heading for column in shown)]
     headings += [f"{shown[0].heading}: ratio of means", "better on"]
+    metrics = ["", "", "", "", "", *(column.metric for column in shown), "", ""]
     if all(line[2] == "-" for line in lines):
-        headings, *lines = ([*line[:2], *line[3:]] for line in (headings, *lines))
-    return markdown_table(headings, lines)
+        headings, metrics, *lines = ([*line[:2], *line[3:]] for line in (headings, metrics, *lines))
+    return Table(headings, lines, of_columns=metrics)
 
 
 def changed_places(pairs: Sequence[tuple[str, str]], places: Mapping[Place, PlacePages]) -> Iterator[tuple[Place, str]]:

@@ -352,7 +352,8 @@ def test_run_json_says_what_produced_the_numbers_and_names_no_folder(program: Pr
     text = (out / "run.json").read_text()
     run = json.loads(text)
     assert set(run) == {
-        "changed_since_commit", "commit", "config", "config_hash", "experiment", "failures", "machine", "versions",
+        "changed_since_commit", "commit", "commit_date", "config", "config_hash", "experiment", "failures", "machine",
+        "versions",
     }  # fmt: skip
     assert run["config"]["sheet"]["slope_p90_deg"] == 20.0
     assert len(run["config_hash"]) == 64

@@ -131,9 +131,9 @@ def _paragraph(number: int, claim: Claim, lines: Sequence[Judged], evidence: Evi
     yield f"> {claim.quote} (section {claim.section})"
     yield f"**Test.** {claim.test}"
     yield "\n".join(_bullet(line) for line in lines)
-    yield f"**Why.** {claim.why.format_map(_details(claim, evidence))}"
+    yield f"**Why.** {claim.why.format_map(details_of(claim, evidence))}"
     made = (
-        f"[{report}]({report}/table.md) by `{_command(report, evidence)}`" for report in _reports_of(claim, evidence)
+        f"[{report}]({report}/table.md) by `{_command(report, evidence)}`" for report in reports_of(claim, evidence)
     )
     sources = "; ".join(made)
     if sources:
@@ -144,16 +144,18 @@ def _bullet(line: Judged) -> str:
     figure = "" if line.figure is None else f": {line.figure.counted}"
     best = f" Best: {line.best_text}." if line.best is not None else ""
     return (
-        f"- **{line.verdict_text}**. {_capital(line.line.what)}{figure}; the paper: {line.line.paper}. "
+        f"- **{line.verdict_text}**. {capital(line.line.what)}{figure}; the paper: {line.line.paper}. "
         f"Reproduced if {line.line.rule.text}.{best}"
     )
 
 
-def _capital(text: str) -> str:
+def capital(text: str) -> str:
+    """Return a sentence's beginning; a symbol stays as it is."""
     return text if text.startswith("k_") else text[0].upper() + text[1:]
 
 
-def _details(claim: Claim, evidence: Evidence) -> dict[str, str]:
+def details_of(claim: Claim, evidence: Evidence) -> dict[str, str]:
+    """Return what stands for each `{name}` in a claim's explanation."""
     found = {}
     for name, measure in claim.details.items():
         try:
@@ -163,7 +165,7 @@ def _details(claim: Claim, evidence: Evidence) -> dict[str, str]:
     return found
 
 
-def _reports_of(claim: Claim, evidence: Evidence) -> list[str]:
+def reports_of(claim: Claim, evidence: Evidence) -> list[str]:
     """Return the reports behind a claim that are there, in the order in which it names them."""
     measures = [m for line in claim.lines for m in (line.measure, line.best) if m is not None]
     named = dict.fromkeys(report for measure in [*measures, *claim.details.values()] for report in measure.reports)
@@ -176,7 +178,7 @@ def _command(report: str, evidence: Evidence) -> str:
 
 
 def _reports(claims: Sequence[Claim], evidence: Evidence) -> str:
-    names = dict.fromkeys(report for claim in claims for report in _reports_of(claim, evidence))
+    names = dict.fromkeys(report for claim in claims for report in reports_of(claim, evidence))
     rows = []
     for name in names:
         run = evidence.run(name)
