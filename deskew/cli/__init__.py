@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import typer
 
-from deskew.cli import accuracy, flattening, importing, restoring, scanning, scoring
+from deskew.cli import accuracy, editing, flattening, importing, restoring, scanning, scoring
 from deskew.cli.printing import say
 from deskew.errors import DeskewError
 
@@ -34,6 +34,7 @@ for _command in (
     restoring.restore,
     restoring.run,
     scoring.score,
+    editing.edit,
 ):
     app.command()(_command)
 app.command("import")(importing.import_captures)

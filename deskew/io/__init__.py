@@ -13,7 +13,7 @@ from deskew.io.files import require_writable, write_bytes
 from deskew.io.images import read_image, write_image
 from deskew.io.meshes import MESH_SUFFIXES, Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
 from deskew.io.scans import read_depth, read_depth_image, read_scan, write_depth, write_scan
-from deskew.io.stiffness import StiffnessMap, face_stiffness, read_stiffness
+from deskew.io.stiffness import StiffnessMap, face_stiffness, read_stiffness, write_stiffness
 from deskew.io.tifxyz import Segment, read_tifxyz
 
 __all__ = [
@@ -49,4 +49,5 @@ __all__ = [
     "write_image",
     "write_mesh",
     "write_scan",
+    "write_stiffness",
 ]

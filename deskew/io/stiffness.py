@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from deskew.errors import InputError, require, require_positive
-from deskew.io.files import read_head, read_toml, shown
-from deskew.io.images import read_image
+from deskew.io.files import read_head, read_toml, replacing, shown
+from deskew.io.images import encoded, read_image
 from deskew.io.meshes import Mesh
 from deskew.types import Array, Floats
 
@@ -121,6 +121,42 @@ def read_stiffness(path: Path) -> StiffnessMap:
         return StiffnessMap(labels, constants)
     except InputError as error:
         raise InputError(f"`{path.with_suffix('.toml')}`: {error}") from error
+
+
+def write_stiffness(materials: StiffnessMap, path: Path, names: Mapping[int, str] | None = None) -> None:
+    """Write a stiffness map as :func:`read_stiffness` reads it: the PNG, and the TOML table of the same name beside it.
+
+    Both are whole before either takes its name.
+
+    Parameters
+    ----------
+    materials : StiffnessMap
+        Labels up to 255 make an 8-bit picture, larger ones a 16-bit one.
+    path : Path
+        The PNG.
+    names : mapping of label to str, optional
+        What the materials are called, kept as comments beside their constants.
+
+    Raises
+    ------
+    InputError
+        If `path` does not end in .png, or a label is beyond 65535.
+    StepError
+        If the file system refuses.
+    """
+    path = Path(path)
+    require(path.suffix.lower() == ".png", str(path), "end in .png", path.suffix or "no suffix")
+    most = max([int(materials.labels.max()), *materials.constants])
+    require(most < 1 << 16, "labels", "be in [0, 65535]", most)
+    labels = materials.labels.astype(np.uint8 if most < 1 << 8 else np.uint16)
+    lines = ["[stiffness]"]
+    for label, constant in sorted(materials.constants.items()):
+        name = "".join(c for c in (names or {}).get(label, "") if c.isprintable())
+        lines.append(f"{label} = {float(constant)!r}" + (f"  # {name}" if name else ""))
+    table = path.with_suffix(".toml")
+    with replacing(path) as picture, replacing(table) as text:
+        picture.write_bytes(encoded(labels, ".png"))
+        text.write_text("\n".join([*lines, ""]), encoding="utf-8")
 
 
 def face_stiffness(mesh: Mesh, materials: StiffnessMap) -> Floats:

@@ -11,6 +11,7 @@ from deskew.metrics.images import image_figures
 from deskew.metrics.misses import Misses, count_misses, match_words
 from deskew.metrics.nulls import shifted, shuffled
 from deskew.metrics.ocr import OcrEngine, OcrSettings, ocr_engine
+from deskew.metrics.quadstrain import quad_strain
 from deskew.metrics.regions import region_error
 from deskew.metrics.score import score_flattening
 from deskew.metrics.similarity import ms_ssim
@@ -41,6 +42,7 @@ __all__ = [
     "ms_ssim",
     "ocr_engine",
     "page_coverage",
+    "quad_strain",
     "region_error",
     "require_not_mirrored",
     "score_flattening",

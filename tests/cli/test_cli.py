@@ -37,7 +37,7 @@ from deskew.types import (
     Status,
 )
 
-COMMANDS = ("calibrate", "scan", "accuracy", "flatten", "restore", "run", "score")
+COMMANDS = ("calibrate", "scan", "accuracy", "flatten", "restore", "run", "score", "edit")
 SIZE = (12, 8)
 CAMERA = Pinhole(
     SIZE, np.array([[10.0, 0, 5.5], [0, 10, 3.5], [0, 0, 1]]), np.zeros(5), np.eye(3), np.array([0, 0, 9.0])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from deskew.errors import InputError
-from deskew.io import Mesh, StiffnessMap, face_stiffness, read_stiffness, write_image
+from deskew.io import Mesh, StiffnessMap, face_stiffness, read_stiffness, write_image, write_stiffness
 
 LABELS = np.array([[0, 0, 7], [0, 200, 7]], dtype=np.uint8)
 TABLE = "[stiffness]\n0 = 30\n7 = 0.3\n200 = 3e3\n"
@@ -120,3 +120,29 @@ def test_other_formats_are_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "m.tif"), LABELS)
     with pytest.raises(InputError, match=r"must end in \.png, got \.tif"):
         read_stiffness(tmp_path / "m.tif")
+
+
+@pytest.mark.parametrize(("labels", "depth"), [([[0, 7], [255, 7]], np.uint8), ([[0, 7], [256, 65535]], np.uint16)])
+def test_a_written_map_is_read_as_it_was(tmp_path: Path, labels: list[list[int]], depth: type) -> None:
+    made = StiffnessMap(
+        np.array(labels, np.uint16), {n: 1 / (n + 3) for n in (0, 7, 255, 256, 65535) if n <= np.max(labels)}
+    )
+    write_stiffness(made, tmp_path / "m.png", {7: 'vellum, "old"\n[x]'})
+    found = read_stiffness(tmp_path / "m.png")
+    assert dict(found.constants) == dict(made.constants)
+    assert found.labels.dtype == depth
+    assert np.array_equal(found.labels, made.labels)
+    assert '7 = 0.1  # vellum, "old"[x]\n' in (tmp_path / "m.toml").read_text()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["m.png", "m.toml"]
+
+
+def test_a_map_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    made = StiffnessMap(LABELS, {0: 1.0, 7: 2.0, 200: 3.0})
+    with pytest.raises(InputError, match=r"m\.tif` must end in \.png"):
+        write_stiffness(made, tmp_path / "m.tif")
+    with pytest.raises(InputError, match=r"`labels` must be in \[0, 65535\], got 65536"):
+        write_stiffness(StiffnessMap(LABELS, {**made.constants, 65536: 1.0}), tmp_path / "m.png")
+    (tmp_path / "m.toml").mkdir()
+    with pytest.raises(InputError, match=r"m\.toml` must be a file name, got a folder"):
+        write_stiffness(made, tmp_path / "m.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["m.toml"]
