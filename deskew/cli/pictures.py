@@ -13,7 +13,7 @@ from deskew.cli.options import EVERY_LIGHT
 from deskew.errors import require
 
 if TYPE_CHECKING:
-    from deskew.types import Array, Pinhole, Scan
+    from deskew.types import Array
 
 PICTURES = (".png", ".tif", ".tiff")
 
@@ -80,21 +80,6 @@ class Wanted:
             restoration.require_combination(how, known if ratio else named or known)
         for path in self.paths(known).values():
             io.require_writable(path, PICTURES)
-
-
-_PER_INCH = {"mm": 25.4, "cm": 2.54, "m": 0.0254, "in": 1.0}
-
-
-def dots_per_inch(scan: Scan, camera: Pinhole, backward_map: Array) -> tuple[float, float] | None:
-    """Return the restored view's resolution along x and y; None where the unit of length is no known one."""
-    import numpy as np
-
-    from deskew import restoration
-
-    if scan.unit not in _PER_INCH:
-        return None
-    x, y = restoration.pixels_per_unit(camera, np.isfinite(backward_map[..., 0]))
-    return x * _PER_INCH[scan.unit], y * _PER_INCH[scan.unit]
 
 
 def write_pictures(

@@ -35,7 +35,7 @@ from deskew.cli.options import (
     Shape,
     Stiffness,
 )
-from deskew.cli.pictures import PICTURES, Wanted, dots_per_inch, write_pictures
+from deskew.cli.pictures import PICTURES, Wanted, write_pictures
 from deskew.cli.printing import flattened_figures, projector_figures, report
 from deskew.cli.progress import working
 from deskew.cli.scanning import Scanning, scan_page
@@ -203,7 +203,7 @@ def _restore_whole(found: Scan, method: str, kind: Kind, output: Path) -> tuple[
         image = restoration.dewarp_by(flattening.find_method(method), found.images[WHITE]).image
     else:
         restored = pipeline.restore(found, method=method)
-        image, dpi = restored.image, dots_per_inch(found, restored.camera, restored.backward_map)
+        image, dpi = restored.image, restoration.dots_per_inch(found, restored.camera, restored.backward_map)
     write_pictures({WHITE: image}, {WHITE: output}, found.profiles, dpi)
     return {"restored": str(output), "method": method, "kind": str(kind), **_named_dpi(dpi)}, [output]
 
@@ -225,7 +225,7 @@ def restore_page(
         parts = {light: restored.images[light] for light in wanted.combined(how, known)}
         pictures |= restoration.combined(parts, page, how)
     paths = wanted.paths(known)
-    dpi = dots_per_inch(found, restored.camera, restored.backward_map)
+    dpi = restoration.dots_per_inch(found, restored.camera, restored.backward_map)
     figures: dict[str, Any] = {"restored": [str(path) for path in paths.values()], "method": method}
     if len(paths) == 1:
         figures["restored"] = str(wanted.output)

@@ -7,9 +7,33 @@ import numpy.typing as npt
 
 from deskew import projection
 from deskew.errors import StepError
-from deskew.types import Floats, Pinhole
+from deskew.types import Floats, Pinhole, Scan
 
+_PER_INCH = {"mm": 25.4, "cm": 2.54, "m": 0.0254, "in": 1.0}
 _STEPS = 32  # the page is asked at about this many places down and across
+
+
+def dots_per_inch(scan: Scan, camera: Pinhole, backward_map: npt.NDArray[np.float32]) -> tuple[float, float] | None:
+    """Return a restored view's dots per inch along its rows and columns.
+
+    Parameters
+    ----------
+    scan : Scan
+        Its unit of length counts.
+    camera : Pinhole
+        The ideal camera that the view is seen through.
+    backward_map : (height, width, 2) array
+        NaN where the view does not show the page.
+
+    Returns
+    -------
+    x, y : float, or None
+        None where the unit is not mm, cm, m or in.
+    """
+    if scan.unit not in _PER_INCH:
+        return None
+    x, y = pixels_per_unit(camera, np.isfinite(backward_map[..., 0]))
+    return x * _PER_INCH[scan.unit], y * _PER_INCH[scan.unit]
 
 
 def pixels_per_unit(camera: Pinhole, page: npt.NDArray[np.bool_]) -> tuple[float, float]:

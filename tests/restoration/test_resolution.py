@@ -5,8 +5,8 @@ import pytest
 
 from deskew.errors import StepError
 from deskew.projection import onto_bed, pixel_grid
-from deskew.restoration import pixels_per_unit
-from deskew.types import Pinhole
+from deskew.restoration import dots_per_inch, pixels_per_unit
+from deskew.types import DepthMap, Pinhole, Scan, Sheet
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 
@@ -44,3 +44,12 @@ def test_a_leaning_camera_has_the_mean_of_its_near_and_far_side() -> None:
 def test_hardly_any_page_has_no_resolution(page: np.ndarray) -> None:
     with pytest.raises(StepError, match="The resolution cannot be told"):
         pixels_per_unit(camera(), page)
+
+
+@pytest.mark.parametrize(("unit", "wanted"), [("mm", 25.4 * 1.5), ("cm", 2.54 * 1.5), ("in", 1.5), ("units", None)])
+def test_dots_per_inch_follow_the_unit(unit: str, wanted: float | None) -> None:
+    depth = DepthMap(np.full((120, 160), 600.0), np.zeros((120, 160), np.uint8), camera())
+    sheet = Sheet(np.dstack([*np.meshgrid([0.0, 9.0], [9.0, 0.0]), np.zeros((2, 2))]))
+    scan = Scan({}, depth, camera(), sheet, np.zeros((4, 2)), unit=unit)
+    found = dots_per_inch(scan, camera(), np.zeros((120, 160, 2), np.float32))
+    assert found == (None if wanted is None else pytest.approx((wanted, wanted)))
