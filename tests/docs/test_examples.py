@@ -7,23 +7,22 @@ import shlex
 import shutil
 import tomllib
 from collections.abc import Iterator
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
 
-import data_synth as ds
 import data_synth.captures
+from data_synth.captures import scaled
+from data_synth.rig import default_rig
 from deskew import cli
-from deskew.types import Pinhole
 from experiments import program
 from experiments.campaign import Finished
 from experiments.settings import Config
 from tests.docs.blocks import PAGES, ROOT, Block, blocks, commands, indented
 
-EXAMPLE = ".venv/bin/python -m data_synth.captures out/example --pattern gray_code"
+EXAMPLE = ".venv/bin/python -m data_synth.captures out/example --pattern gray_code --pages 2 --lights"
 
 FOLDERS = {"BOARD": "board", "PAGE": "page_00", "PLANE": "flat"}
 """What the pages call folders of the user's own: here those of the example."""
@@ -60,22 +59,16 @@ def reason_not_to_run(command: str) -> str | None:
     return next((why for start, why in NOT_RUN.items() if command.startswith(start)), None)
 
 
-def coarser(device: Pinhole, factor: int) -> Pinhole:
-    """The same view in fewer pixels."""
-    K = device.K.copy()
-    K[:2, 2] = (K[:2, 2] + 0.5) / factor - 0.5
-    K[[0, 0, 1], [0, 1, 1]] /= factor
-    return replace(device, size=(device.size[0] // factor, device.size[1] // factor), K=K)
-
-
-def small_rig() -> ds.Rig:
-    rig = ds.default_rig()
-    return replace(rig, camera=coarser(rig.camera, 2), projector=coarser(rig.projector, 2))
+def files(pattern: str) -> list[str]:
+    """What a shell makes of a pattern."""
+    found = sorted(map(str, Path().glob(pattern)))
+    assert found, pattern
+    return found
 
 
 def run(command: str) -> int:
     """Run a command in this process: starting one for each would take most of the time."""
-    words = shlex.split(command)
+    words = [word for part in shlex.split(command) for word in (files(part) if "*" in part else [part])]
     while "=" in words[0]:
         words = words[1:]  # a search path, for what is not imported here
     if words[0] == ".venv/bin/deskew":
@@ -97,7 +90,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(program, "carry_out_campaign", checked)
-    monkeypatch.setattr(data_synth.captures, "default_rig", small_rig)
+    monkeypatch.setattr(data_synth.captures, "default_rig", lambda: scaled(default_rig(), 0.5))
     (tmp_path / "docs").symlink_to(ROOT / "docs")
     (tmp_path / "out").mkdir()
     for name, folder in FOLDERS.items():
