@@ -12,7 +12,7 @@ JOBS ?= 2
 
 BIN := .venv/bin
 STAMP := .venv/.complete
-SOURCES := deskew data_synth experiments tests
+SOURCES := deskew data_synth docs experiments tests
 EXPERIMENTS := plane_accuracy corner_distance corner_distance_physical ocr_misses stiffness integrators
 EXPERIMENTS += surfaces surfaces_noisy real_boards settling culling attribution
 # Beyond the paper; they take as long again, so only the largest budget runs them.
@@ -26,7 +26,7 @@ PHYSICAL_full := sheet=physical sheet.drawn=true
 # What a run at this budget may overwrite: smoke proves that it runs and never touches the committed reports.
 REPORTS = $(if $(filter smoke,$(BUDGET)),out/smoke,reports)
 
-.PHONY: setup reproduce $(EXPERIMENTS) check report bench test lint format lock clean help
+.PHONY: setup reproduce $(EXPERIMENTS) check docs report bench test lint format lock clean help
 
 help: ## list the targets
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -52,6 +52,9 @@ $(EXPERIMENTS): $(STAMP)
 
 check: $(STAMP) ## the regression gate: the pages of reports/baseline/ by the present code (docs/gate.md)
 	@$(BIN)/python -m experiments.gate --baseline reports/baseline/smoke.csv --junit out/gate.xml
+
+docs: $(STAMP) ## the documentation as a site in out/docs, every reference and link checked
+	@$(BIN)/sphinx-build -E -W --keep-going -n -q -c docs . out/docs
 
 report: $(STAMP) ## write out/report.html, the report for people: one file, offline
 	@$(BIN)/python -m experiments.page

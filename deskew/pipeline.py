@@ -51,6 +51,8 @@ def scan_by(
     *,
     shape: tuple[int, int] = (45, 45),
     mask: npt.NDArray[np.bool_] | None = None,
+    depth: DepthSettings | None = None,
+    max_hole_px: float = 12.0,
 ) -> Scan:
     """Scan a page by a recipe; see :func:`scan` for the rest."""
     return scan(
@@ -58,6 +60,8 @@ def scan_by(
         calibration,
         shape=shape,
         mask=mask,
+        depth=depth,
+        max_hole_px=max_hole_px,
         settings=decoder_for(recipe, capture.pattern),
         ink=InkSettings() if recipe.ink else None,
         denoise=DenoiseSettings() if recipe.denoise else None,
@@ -185,6 +189,8 @@ def span(
         mesh.sheet,
         outline.corners,
         filled_fraction=mesh.filled_fraction,
+        unit=calibration.unit,
+        profiles=capture.profiles,
     )
 
 
@@ -205,7 +211,9 @@ def with_shading_removed(scan: Scan, capture: Capture, calibration: Calibration,
     points = restoration.surface_points(scan.depth)
     devices = calibration.camera, calibration.projector
     unshaded = restoration.remove_shading(capture.white, capture.black, *devices, points, _NORMALS_PX[recipe.denoise])
-    return replace(scan, images={**scan.images, restoration.UNSHADED: unshaded})
+    profiles = {restoration.UNSHADED: scan.profiles[WHITE]} if WHITE in scan.profiles else {}
+    images = {**scan.images, restoration.UNSHADED: unshaded}
+    return replace(scan, images=images, profiles={**scan.profiles, **profiles})
 
 
 def find_leaf(scan: Scan, capture: Capture, calibration: Calibration) -> npt.NDArray[np.bool_]:

@@ -10,6 +10,13 @@ from deskew.acquisition.accuracy import (
     length_errors,
     plane_deviation,
 )
+from deskew.acquisition.boardcheck import (
+    BoardAccuracy,
+    board_accuracy,
+    board_border,
+    corners_in_view,
+    scanned_points,
+)
 from deskew.acquisition.calibration import BoardView, board_points, calibrate, view_board
 from deskew.acquisition.corners import (
     find_board,
@@ -37,6 +44,7 @@ from deskew.acquisition.triangulation import triangulate
 
 __all__ = [
     "DISCARDED_SHARE",
+    "BoardAccuracy",
     "BoardView",
     "DecoderSettings",
     "DenoiseSettings",
@@ -51,8 +59,11 @@ __all__ = [
     "Sphere",
     "SweepSettings",
     "average_deviation",
+    "board_accuracy",
+    "board_border",
     "board_points",
     "calibrate",
+    "corners_in_view",
     "correct_ink",
     "decode",
     "decode_gray",
@@ -80,6 +91,7 @@ __all__ = [
     "refine_kitchen_rosenfeld",
     "refine_saddle",
     "require_same_devices",
+    "scanned_points",
     "settings_for_ink",
     "spacing_error_mm",
     "straight_outline",

@@ -21,6 +21,7 @@ from deskew.acquisition.grey import grey_levels
 from deskew.acquisition.holdout import held_out
 from deskew.acquisition.psf import camera_psf, edge_blurs
 from deskew.errors import StepError, require, require_whole
+from deskew.threads import one_thread
 from deskew.types import Board, Calibration, Capture, Correspondence, Floats, Pinhole, Size
 
 MIN_POSES = 3
@@ -142,6 +143,7 @@ def _inside_white(board: Board, corners: Floats, lit: Floats) -> npt.NDArray[np.
     return np.asarray(inner & (odd == white_is_odd))
 
 
+@one_thread()  # OpenCV adds its boards up as its threads end, and where a fit rests follows
 def calibrate(board: Board, views: Sequence[BoardView]) -> Calibration:
     """Calibrate both devices from at least three poses; the first one defines the world, its Z = 0 being the bed.
 

@@ -119,7 +119,7 @@ def kitchen_rosenfeld_peaks(image: Array, seeds: Floats, *, radius_px: int = 10,
 def refine_kitchen_rosenfeld(
     image: Array, seeds: Floats, *, radius_px: int = 10, sigma_px: float = 2.0, n_iterations: int = 30
 ) -> Floats:
-    """Refine corners to the centroid of Kitchen-Rosenfeld's |response|, re-centred until it rests.
+    """Refine corners to the centroid of Kitchen-Rosenfeld's response without its sign, re-centred until it rests.
 
     Parameters
     ----------

@@ -39,8 +39,8 @@ class GrayCodeSettings:
     shadow_snr : float
         Least white minus black of a lit pixel, over the noise of one frame.
     bit_snr : float
-        Least |pattern - inverse| of a bit, over the noise of that difference. One bit may be fainter: it is grey where
-        the pixel lies on its border. Two make the pixel `WEAK`.
+        Least contrast of a bit to its inverse, over the noise of the difference. One bit may be fainter: it is grey
+        where the pixel lies on its border. Two make the pixel `WEAK`.
     gap_max_px : int
         Widest stretch of camera pixels between two borders that is interpolated.
     ink_slope_max : float or None

@@ -60,8 +60,8 @@ class PhaseSettings:
     min_snr : float
         Least modulation of a fringe, over its own standard deviation; the phase is then known to 1 / snr radians.
     bit_snr : float
-        Least |pattern - inverse| of a bit of the Gray code. One bit may be fainter, if the phase says that the pixel
-        lies on its border.
+        Least contrast of a bit of the Gray code to its inverse. One bit may be fainter, if the phase says that the
+        pixel lies on its border.
     unwrap_snr : float
         Least distance to a wrong period, half of the shorter fringe's, over the longer one's noise.
     contrast_ratio : float

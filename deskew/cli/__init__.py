@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import typer
 
-from deskew.cli import editing, flattening, restoring, scanning, scoring
+from deskew.cli import accuracy, editing, flattening, importing, restoring, scanning, scoring
 from deskew.cli.printing import say
 from deskew.errors import DeskewError
 
@@ -30,7 +30,7 @@ app = typer.Typer(
 for _command in (
     scanning.calibrate,
     scanning.scan,
-    scanning.accuracy,
+    accuracy.accuracy,
     flattening.flatten,
     restoring.restore,
     restoring.run,
@@ -38,6 +38,7 @@ for _command in (
     editing.edit,
 ):
     app.command()(_command)
+app.command("import")(importing.import_captures)
 
 
 def _value_of(error: typer.TyperException, given: Sequence[str]) -> str:

@@ -29,6 +29,10 @@ Noise = Annotated[
     str | None,
     typer.Option("--noise", metavar="auto|MM", help="Scanner noise to remove; auto, the default, estimates it."),
 ]
+Picture = Annotated[
+    Path | None,
+    typer.Option("--picture", metavar="IMAGE", help="The texture's picture, to be named in the flat mesh for viewers."),
+]
 Voxel = Annotated[float | None, typer.Option("--voxel", metavar="MM", help="Edge of a tifxyz folder's voxels [mm].")]
 
 
@@ -39,6 +43,7 @@ def flatten(
     stiffness: Stiffness = None,
     noise: Noise = None,
     voxel: Voxel = None,
+    picture: Picture = None,
     as_json: Json = False,
 ) -> None:
     """Flatten a mesh from any scanner: the same vertices and faces, in their order, on the plane z = 0.
@@ -49,6 +54,8 @@ def flatten(
 
     Example: deskew flatten page.obj -o flat.ply --noise auto
 
+    Example: deskew flatten page.ply -o flat.ply --picture page-white.png
+
     Example: deskew flatten segment/ -o flat.ply --voxel 0.00864
     """
     from deskew import io
@@ -57,6 +64,7 @@ def flatten(
     settings = _settings(method, noise)
     require_method(method)
     mesh = _read(surface, voxel)
+    shown = _named(picture, mesh, output)
     constants: Floats | None = None
     if stiffness is not None:
         require(mesh.texture is not None, str(surface), "have texture coordinates for a stiffness map", "none")
@@ -69,8 +77,19 @@ def flatten(
         raise StepError(f"Flattening diverged: {flattened.remedy}")
     head = {"flat": str(output), "method": method, "vertices": len(mesh.vertices), "faces": len(mesh.faces)}
     figures = head | flattened_figures(flattened, "sheet")
-    io.write_mesh(io.Mesh(flattened.vertices, mesh.faces, mesh.texture), output)
+    io.write_mesh(io.Mesh(flattened.vertices, mesh.faces, mesh.texture), output, shown)
     report(figures, as_json, output)
+
+
+def _named(picture: Path | None, mesh: Mesh, output: Path) -> str | None:
+    """Name a texture's picture as seen from the mesh that is to be written; its own pixels are not read."""
+    if picture is None:
+        return None
+    from deskew.io.files import require_file
+
+    require_file(picture)
+    require(mesh.texture is not None, "--picture", "come with a mesh that has texture coordinates", "none")
+    return Path(os.path.relpath(picture, output.parent)).as_posix()
 
 
 def require_method(method: str, kinds: tuple[Kind, ...] = (Kind.FLATTENER,)) -> Kind:

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from deskew.errors import require
+
+if TYPE_CHECKING:
+    from deskew.acquisition import DepthSettings
 
 CaptureFolder = Annotated[
     Path, typer.Argument(metavar="CAPTURE", help="Capture folder (capture.toml, white.png, ...).")
@@ -33,9 +40,15 @@ Method = Annotated[
         "or one of your own: package.module:function or an installed entry point, run in this very process.",
     ),
 ]
+EVERY_LIGHT = "all"
 Lights = Annotated[
     list[str] | None,
-    typer.Option("--light", "-l", metavar="NAME", help="Light to restore; may be repeated. White unless any is named."),
+    typer.Option(
+        "--light",
+        "-l",
+        metavar="NAME",
+        help=f"Light to restore; may be repeated; {EVERY_LIGHT}: every one of the capture. White unless any is named.",
+    ),
 ]
 Combine = Annotated[
     list[str] | None,
@@ -61,4 +74,51 @@ FreeScale = Annotated[
         help="Let the softer of the map's two materials have shrunk or grown, and say by how much; spring alone.",
     ),
 ]
+Heights = Annotated[
+    tuple[float, float],
+    typer.Option("--heights", metavar="LOW HIGH", help="Heights above the bed that are believed [calibration's unit]."),
+]
+Neighbour = Annotated[
+    float,
+    typer.Option("--neighbour", metavar="D", help="Pixels that differ in depth by less support each other [unit]."),
+]
+Jump = Annotated[
+    float,
+    typer.Option("--jump", metavar="D", help="Nothing is interpolated over a larger step in depth [unit]."),
+]
+Hole = Annotated[
+    float,
+    typer.Option("--hole", metavar="PX", help="The mesh spans gaps in the depth up to so far from what was measured."),
+]
+HEIGHTS, NEIGHBOUR, JUMP, HOLE = (-10.0, 150.0), 1.0, 3.0, 12.0
+"""For a page in millimetres, some 800 mm from the camera; what is far away or in another unit needs others."""
+
+_HOLE_MAX_PX = 10_000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Gates:
+    """What is believed of measured depth, as the options say."""
+
+    heights: tuple[float, float] = HEIGHTS
+    neighbour: float = NEIGHBOUR
+    jump: float = JUMP
+    hole: float = HOLE
+
+    def __post_init__(self) -> None:
+        low, high = self.heights
+        require(-math.inf < low < high < math.inf, "--heights", "be LOW HIGH, the first below the second", self.heights)
+        for name in ("neighbour", "jump"):
+            value = getattr(self, name)
+            require(0 < value < math.inf, f"--{name}", "be finite and above 0", value)
+        require(0 <= self.hole <= _HOLE_MAX_PX, "--hole", f"lie in [0, {_HOLE_MAX_PX:g}] px", self.hole)
+
+    def settings(self) -> DepthSettings:
+        """Return them as the depth map takes them."""
+        from deskew.acquisition import DepthSettings
+
+        low, high = self.heights
+        return DepthSettings(z_min_mm=low, z_max_mm=high, neighbour_mm=self.neighbour, jump_mm=self.jump)
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]

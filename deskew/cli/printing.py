@@ -40,12 +40,17 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def json_text(figures: Mapping[str, Any], indent: int | None = None) -> str:
+    """Write figures as JSON, numbers of numpy's as Python's, and null for what is not finite."""
+    return json.dumps(_finite(_plain(figures)), indent=indent)
+
+
 def report(figures: Mapping[str, Any], as_json: bool, *written: Path) -> None:
     """Print figures, and say what has been `written` already if nobody takes them."""
     plain = _plain(figures)
     lines = [f"{key}: {f'{value:.6g}' if isinstance(value, float) else value}" for key, value in plain.items()]
     try:
-        print(json.dumps(_finite(plain)) if as_json else "\n".join(lines), flush=True)
+        print(json_text(plain) if as_json else "\n".join(lines), flush=True)
     except OSError as error:
         # Else the interpreter would try once more to print what is left in the buffer, and complain in its own words.
         with suppress(OSError, ValueError):

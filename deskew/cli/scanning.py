@@ -1,20 +1,39 @@
-"""Commands that measure: `calibrate`, `scan` and `accuracy`."""
+"""Commands that measure devices and shapes: `calibrate` and `scan`."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from deskew.cli.options import CalibrationFile, CaptureFolder, Denoise, Ink, Json, Mask, Shape
-from deskew.cli.pictures import Wanted
+from deskew.cli.metadata import Record, read_record, write_metadata
+from deskew.cli.options import (
+    HEIGHTS,
+    HOLE,
+    JUMP,
+    NEIGHBOUR,
+    CalibrationFile,
+    CaptureFolder,
+    Denoise,
+    Gates,
+    Heights,
+    Hole,
+    Ink,
+    Json,
+    Jump,
+    Mask,
+    Neighbour,
+    Shape,
+)
+from deskew.cli.pictures import Wanted, all_or_none
 from deskew.cli.printing import depth_figures, projector_figures, report, warn
+from deskew.cli.progress import open_capture, showing_progress, working
 from deskew.errors import require
 from deskew.recipes import Recipe, recipe_for
+from deskew.types import WHITE
 
 if TYPE_CHECKING:
     from deskew.io import StiffnessMap
@@ -23,8 +42,7 @@ if TYPE_CHECKING:
         Calibration,
         Capture,
         Correspondence,
-        DepthMap,
-        Frames,
+        Floats,
         PatternKind,
         ProjectorCheck,
         Scan,
@@ -35,33 +53,14 @@ if TYPE_CHECKING:
 _METHOD = "spring"  # a scan that is kept is made for this one, unless the user says how
 
 
-@dataclass(frozen=True, slots=True)
-class _Watched:
-    """Frames that show on a terminal how far they have been read; into a log or a pipe they write nothing."""
-
-    frames: Frames
-    label: str
-
-    def __len__(self) -> int:
-        return len(self.frames)
-
-    def __iter__(self) -> Iterator[Array]:
-        from tqdm import tqdm
-
-        yield from tqdm(self.frames, self.label, unit="frame", file=sys.stderr, leave=False, disable=None)
-
-
-def showing_progress(capture: Capture, label: str) -> Capture:
-    """Let a capture's frames show on a terminal how far they have been read."""
-    columns = _Watched(capture.columns, f"{label} columns")
-    return replace(capture, columns=columns, rows=_Watched(capture.rows, f"{label} rows"))
-
-
-def open_capture(folder: Path) -> Capture:
-    """Read a capture folder, its frames one by one and in sight."""
+def read_mask(path: Path, size: tuple[int, int]) -> Array:
+    """Read where the page is in the camera's picture, (height, width) bool."""
     from deskew import io
 
-    return showing_progress(io.read_capture(folder), folder.name)
+    picture = io.read_image(path, size)
+    page: Array = (picture if picture.ndim == 2 else picture.max(axis=-1)) > 0
+    require(bool(page.any()), "--mask", "show the page: not black all over", str(path))
+    return page
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +74,8 @@ class Scanning:
     denoise: bool | None
     stiffness: Path | None = None
     unshaded: bool = False
+    gates: Gates = field(default_factory=Gates)
+    quiet: bool = False
 
     def recipe(self, pattern: PatternKind) -> Recipe:
         """Return the method's own recipe, but for what the user says."""
@@ -84,14 +85,7 @@ class Scanning:
 
     def page(self, size: tuple[int, int]) -> Array | None:
         """Read the mask, (height, width) bool."""
-        if self.mask is None:
-            return None
-        from deskew import io
-
-        picture = io.read_image(self.mask, size)
-        page: Array = (picture if picture.ndim == 2 else picture.max(axis=-1)) > 0
-        require(bool(page.any()), "--mask", "show the page: not black all over", str(self.mask))
-        return page
+        return None if self.mask is None else read_mask(self.mask, size)
 
     def materials(self, size: tuple[int, int]) -> StiffnessMap | None:
         """Read the stiffness map; one of another size than the camera's is refused before the long work."""
@@ -108,15 +102,20 @@ def scan_page(folder: Path, calibration: Calibration, how: Scanning, wanted: Wan
     """Scan a page as asked; what cannot be `wanted` of it is refused before the long work."""
     allowed = all(2 <= n <= 1000 for n in how.shape)
     require(allowed, "--shape", "be 2 to 1000 vertices down and across", f"{how.shape[0]} {how.shape[1]}")
-    capture = open_capture(folder)  # before the import below: a wrong folder is then refused within the blink of an eye
+    # Before the import below: a wrong folder is then refused within the blink of an eye.
+    capture = open_capture(folder, how.quiet)
     unshaded = _unshaded(capture, how, wanted)
     mask, materials = how.page(capture.camera_size), how.materials(capture.camera_size)
     from deskew import pipeline
 
-    found = pipeline.scan_by(how.recipe(capture.pattern), capture, calibration, shape=how.shape, mask=mask)
+    depth, recipe = how.gates.settings(), how.recipe(capture.pattern)
+    with working(f"{folder.name}: measuring", how.quiet):
+        found = pipeline.scan_by(
+            recipe, capture, calibration, shape=how.shape, mask=mask, depth=depth, max_hole_px=how.gates.hole
+        )
     warn(found.projector, folder.name)
     if unshaded:
-        found = pipeline.with_shading_removed(found, capture, calibration, how.recipe(capture.pattern))
+        found = pipeline.with_shading_removed(found, capture, calibration, recipe)
     return found if materials is None else pipeline.with_stiffness(found, materials)
 
 
@@ -141,11 +140,16 @@ def _unshaded(capture: Capture, how: Scanning, wanted: Wanted | None) -> bool:
 def calibrate(
     board_folder: Annotated[Path, typer.Argument(metavar="BOARD_FOLDER", help="board.toml, pose_00/, pose_01/, ...")],
     output: Annotated[Path, typer.Option("--output", "-o", help="calibration.json to write.")],
+    leave_out: Annotated[
+        list[int] | None,
+        typer.Option("--leave-out", metavar="POSE", help="Number of a pose not to be used; may be repeated."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Calibrate camera and projector from captures of a printed checkerboard.
 
-    Pose 00 lies on the bed and defines the world: Z = 0, X right and Y up in the camera's picture.
+    Pose 00 lies on the bed and defines the world: Z = 0, X right and Y up in the camera's picture. If it is left out,
+    the first of the others does.
 
     Example: deskew calibrate board/ -o calibration.json
     """
@@ -153,16 +157,22 @@ def calibrate(
 
     io.require_writable(output, (".json",))
     board, captures = io.read_board(board_folder)
-    watched = [showing_progress(capture, f"pose {i:02d}") for i, capture in enumerate(captures)]
-    checks: list[ProjectorCheck] = []
+    out = set(leave_out or ())
+    known = out <= set(range(len(captures)))
+    require(known, "--leave-out", f"be a pose in [0, {len(captures) - 1}]", sorted(out))
+    kept = [i for i in range(len(captures)) if i not in out]
+    checks: dict[int, ProjectorCheck] = {}
 
     def watch(decoded: Correspondence) -> None:
-        warn(decoded.projector, f"pose {len(checks):02d}")
-        checks.append(decoded.projector)
+        i = kept[len(checks)]
+        warn(decoded.projector, f"pose {i:02d}")
+        checks[i] = decoded.projector
 
-    calibration = pipeline.calibrate(board, watched, watch=watch)
+    with working("calibrating", as_json):
+        poses = [showing_progress(captures[i], f"pose {i:02d}", as_json) for i in kept]
+        calibration = pipeline.calibrate(board, poses, watch=watch)
     io.write_calibration(calibration, output)
-    faulty = [f"pose_{i:02d}" for i, check in enumerate(checks) if check.faults]
+    faulty = [f"pose_{i:02d}" for i, check in checks.items() if check.faults]
     figures = {"n_poses": calibration.n_poses, **calibration.residuals, **calibration.convergence}
     report(
         {"calibration": str(output), **figures} | ({"projector_faults_in": faulty} if faulty else {}), as_json, output
@@ -172,7 +182,9 @@ def calibrate(
 def scan(
     capture: CaptureFolder,
     calibration: CalibrationFile,
-    output: Annotated[Path, typer.Option("--output", "-o", help="scan.npz (everything) or scan.ply (the mesh).")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="scan.npz (everything), or scan.ply or scan.obj (the mesh).")
+    ],
     shape: Shape = (45, 45),
     mask: Mask = None,
     ink: Ink = None,
@@ -181,77 +193,84 @@ def scan(
         bool,
         typer.Option("--unshaded", help="Keep the light `unshaded` too: white without the projector's shading."),
     ] = False,
+    heights: Heights = HEIGHTS,
+    neighbour: Neighbour = NEIGHBOUR,
+    jump: Jump = JUMP,
+    hole: Hole = HOLE,
+    accuracy: Annotated[
+        Path | None,
+        typer.Option(
+            "--accuracy",
+            metavar="RECORD.json",
+            help="Accuracy of the same calibration, from `deskew accuracy`, to be kept beside the scan, in scan.json.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Measure the page's 3D shape: depth map and mesh, in millimetres.
+    """Measure the page's 3D shape: depth map and mesh, in the calibration's unit.
 
-    A PLY carries texture coordinates into the raw white image; `deskew restore` needs the NPZ. For the paper's methods
-    scan as the paper does: --no-ink --no-denoise.
+    A PLY or OBJ has texture coordinates into the raw white image, which is written beside it, scan-white.png: MeshLab
+    and Blender show the one on the other. `deskew restore` needs the NPZ. For the paper's methods scan as the paper
+    does: --no-ink --no-denoise.
 
     Example: deskew scan page/ --calibration calibration.json -o scan.npz
-    """
-    from deskew import io, projection
 
-    io.require_writable(output, (".npz", ".ply"))
-    found = scan_page(
-        capture, io.read_calibration(calibration), Scanning(shape, mask, _METHOD, ink, denoise, unshaded=unshaded)
+    Example: deskew scan page/ --calibration calibration.json -o page.ply --accuracy accuracy.json
+    """
+    from deskew import io
+
+    io.require_writable(output, (".npz", *io.MESH_SUFFIXES))
+    how = Scanning(
+        shape,
+        mask,
+        _METHOD,
+        ink,
+        denoise,
+        unshaded=unshaded,
+        gates=Gates(heights, neighbour, jump, hole),
+        quiet=as_json,
     )
-    if output.suffix.lower() == ".npz":
-        io.write_scan(found, output)
-    else:
-        size = found.camera.size
-        # Texture coordinates run from the picture's lower left corner, and a pixel's centre lies half a pixel inside.
-        texture = (projection.project(found.camera, found.sheet.vertices) + 0.5) / size
-        texture[..., 1] = 1.0 - texture[..., 1]
-        io.write_mesh(io.sheet_mesh(found.sheet, texture), output)
+    devices = io.read_calibration(calibration)
+    record = None if accuracy is None else read_record(accuracy, calibration)
+    found = scan_page(capture, devices, how)
     figures = {"scan": str(output), "vertices": found.sheet.vertices[..., 0].size, **depth_figures(found.depth)}
     figures |= {"filled_fraction": found.filled_fraction, "cut_quads": _cut_quads(found.sheet)}
-    report(figures | projector_figures(found.projector), as_json, output)
+    figures |= projector_figures(found.projector)
+    written = _write(found, output, record, figures)
+    report(figures, as_json, *written)
+
+
+def _write(found: Scan, output: Path, record: Record | None, figures: Mapping[str, Any]) -> list[Path]:
+    """Write a scan with what goes beside it, all or nothing; return the files."""
+    from deskew import io
+
+    beside = [] if record is None else [output.with_suffix(".json")]
+    is_mesh = output.suffix.lower() != ".npz"
+    picture = output.with_name(f"{output.stem}-{WHITE}.png")
+    material = [output.with_suffix(".mtl")] if output.suffix.lower() == ".obj" else []
+    written = [output, *([picture, *material] if is_mesh else []), *beside]
+    for path in written:
+        io.require_writable(path, (path.suffix.lower(),))
+    with all_or_none(written):
+        if is_mesh:
+            io.write_image(found.images[WHITE], picture, profile=found.profiles.get(WHITE))
+            io.write_mesh(io.sheet_mesh(found.sheet, _texture(found)), output, picture.name)
+        else:
+            io.write_scan(found, output)
+        if record is not None:
+            write_metadata({**figures, "unit": found.unit, "accuracy": record}, beside[0])
+    return written
+
+
+def _texture(found: Scan) -> Floats:
+    """Texture coordinates of a sheet's vertices in the raw white image."""
+    from deskew import projection
+
+    # They run from the picture's lower left corner, and a pixel's centre lies half a pixel inside.
+    texture = (projection.project(found.camera, found.sheet.vertices) + 0.5) / found.camera.size
+    texture[..., 1] = 1.0 - texture[..., 1]
+    return texture
 
 
 def _cut_quads(sheet: Sheet) -> int:
     return 0 if sheet.cut is None else int(sheet.cut.sum())
-
-
-def accuracy(
-    captures: Annotated[list[Path], typer.Argument(metavar="CAPTURE...", help="Capture folders of a flat page.")],
-    calibration: CalibrationFile,
-    as_json: Json = False,
-) -> None:
-    """Measure the scanner's accuracy on planes: the deviation of their points from the best-fit plane (section 2.5).
-
-    Example: deskew accuracy plane_00/ plane_01/ --calibration calibration.json --json
-    """
-    from dataclasses import asdict
-
-    from deskew import acquisition, io
-
-    devices = io.read_calibration(calibration)
-    rows, deviations = [], []
-    for folder in captures:
-        depth, page = _flat_page(folder, devices)
-        deviations.append(acquisition.plane_deviation(acquisition.depth_points(depth, page)))
-        rows.append({"capture": str(folder), **asdict(deviations[-1]), **depth_figures(depth)})
-    average = asdict(acquisition.average_deviation(deviations))
-    if as_json:
-        report({"planes": rows, "average": average}, as_json)
-    for row in () if as_json else (*rows, {"capture": f"average of {len(rows)}", **average}):
-        report(row, as_json)
-
-
-def _flat_page(folder: Path, devices: Calibration) -> tuple[DepthMap, Array]:
-    """Depth of a flat page's capture, and which pixels lie on the page: the desk around it is no part of the plane."""
-    import cv2
-    import numpy as np
-
-    from deskew import acquisition, pipeline
-
-    capture = open_capture(folder)
-    acquisition.require_same_devices(devices, capture)
-    decoded = pipeline.decode(capture)
-    warn(decoded.projector, folder.name)
-    depth = acquisition.depth_map(devices, decoded)
-    corners = acquisition.page_outline(capture.white, capture.black, devices.camera, depth=depth).corners
-    inside = np.zeros(depth.z.shape, np.uint8)
-    cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)  # a flat page's outline has four straight sides
-    return depth, inside.astype(bool)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from deskew import pipeline
+from deskew import pipeline, restoration
 from deskew.editor.draft import draft_of, opened, write_draft
 from deskew.editor.materials import Painting
 from deskew.editor.pictures import as_png, eight_bits, overlay
@@ -220,7 +220,8 @@ class Desk:
             scan = pipeline.with_stiffness(self.scan, self.painting.map)
             light, scale = self.light, self.files.scale
             made = pipeline.restore_lights(scan, method=METHOD, lights=[light], scale=scale, free_scale=self.free_scale)
-            write_image(made.images[light], self.files.restored)
+            dpi = restoration.dots_per_inch(scan, made.camera, made.backward_map)
+            write_image(made.images[light], self.files.restored, profile=scan.profiles.get(light), dpi=dpi)
             return self.files.restored
 
     def _become(self, painting: Painting) -> None:

@@ -5,9 +5,10 @@ takes the thing, then the path, and leaves either the whole file or nothing. Col
 """
 
 from deskew.io.arrays import read_arrays, write_arrays
-from deskew.io.boards import read_board, read_procam_graycode, write_board
+from deskew.io.boards import read_board, read_board_file, read_procam_graycode, write_board
 from deskew.io.calibrations import read_calibration, write_calibration
 from deskew.io.captures import read_capture, write_capture
+from deskew.io.colour import is_profile, read_profile
 from deskew.io.files import require_writable, write_bytes
 from deskew.io.images import read_image, write_image
 from deskew.io.meshes import MESH_SUFFIXES, Mesh, grid_faces, read_mesh, sheet_mesh, write_mesh
@@ -22,8 +23,10 @@ __all__ = [
     "StiffnessMap",
     "face_stiffness",
     "grid_faces",
+    "is_profile",
     "read_arrays",
     "read_board",
+    "read_board_file",
     "read_calibration",
     "read_capture",
     "read_depth",
@@ -31,6 +34,7 @@ __all__ = [
     "read_image",
     "read_mesh",
     "read_procam_graycode",
+    "read_profile",
     "read_scan",
     "read_stiffness",
     "read_tifxyz",

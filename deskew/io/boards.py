@@ -34,6 +34,30 @@ def _pose_folders(folder: Path, prefix: str, digits: int) -> list[Path]:
     return [folder / name for name in wanted]
 
 
+def read_board_file(folder: Path) -> Board:
+    """Read what was printed from the ``board.toml`` of a calibration folder, its poses aside.
+
+    Raises
+    ------
+    InputError
+        Naming the file or key at fault.
+    """
+    folder = Path(folder)
+    require_folder(folder)
+    path = folder / "board.toml"
+    require_inside(path, folder)
+    fields = Fields(read_toml(path), str(path))
+    fields.only(("version", "inner_corners", "square", "unit"))
+    fields.version("version", BOARD_VERSION)
+    corners = fields.pair("inner_corners", 3, MAX_CORNERS)
+    unit = fields.word("unit")
+    require(bool(_UNIT.fullmatch(unit)), f"{path}: unit", "be 1 to 16 letters, such as mm", shown(unit))
+    square = fields.positive("square")
+    sound = SQUARE_RANGE[0] <= square <= SQUARE_RANGE[1]
+    require(sound, f"{path}: square", f"be in [{SQUARE_RANGE[0]:g}, {SQUARE_RANGE[1]:g}]", shown(square))
+    return Board(corners, square, unit)
+
+
 def read_board(folder: Path) -> tuple[Board, list[Capture]]:
     """Open a calibration folder.
 
@@ -55,19 +79,7 @@ def read_board(folder: Path) -> tuple[Board, list[Capture]]:
         Naming the file or key at fault.
     """
     folder = Path(folder)
-    require_folder(folder)
-    path = folder / "board.toml"
-    require_inside(path, folder)
-    fields = Fields(read_toml(path), str(path))
-    fields.only(("version", "inner_corners", "square", "unit"))
-    fields.version("version", BOARD_VERSION)
-    corners = fields.pair("inner_corners", 3, MAX_CORNERS)
-    unit = fields.word("unit")
-    require(bool(_UNIT.fullmatch(unit)), f"{path}: unit", "be 1 to 16 letters, such as mm", shown(unit))
-    square = fields.positive("square")
-    sound = SQUARE_RANGE[0] <= square <= SQUARE_RANGE[1]
-    require(sound, f"{path}: square", f"be in [{SQUARE_RANGE[0]:g}, {SQUARE_RANGE[1]:g}]", shown(square))
-    board = Board(corners, square, unit)
+    board = read_board_file(folder)
     poses = [read_capture(pose) for pose in _pose_folders(folder, "pose_", 2)]
     for i, pose in enumerate(poses):
         for name in ("camera_size", "projector_size"):

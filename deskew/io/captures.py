@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deskew.errors import InputError, require
+from deskew.io.colour import read_profile
 from deskew.io.fields import Fields
 from deskew.io.files import read_toml, replacing_folder, require_folder, require_inside, shown
-from deskew.io.images import encoded, png_size, read_image, require_picture
-from deskew.types import Array, Capture, Frames, Fringe, Fringes, PatternKind, Size, n_frames, require_fringes
+from deskew.io.images import picture_bytes, png_size, read_image, require_picture
+from deskew.types import WHITE, Array, Capture, Frames, Fringe, Fringes, PatternKind, Size, n_frames, require_fringes
 
 CAPTURE_VERSION = 1
 MAX_LIGHTS = 256
@@ -196,12 +197,14 @@ def read_capture(folder: Path) -> Capture:
     textures = _lights(fields, folder)
     fringes = _fringes(fields, pattern, projector_size)
     columns, rows = _sweeps(folder, pattern, fringes, projector_size, white)
-    return Capture(white, black, projector_size, pattern, columns, rows, textures, fringes)
+    pictures = {WHITE: folder / "white.png", **textures.paths}
+    profiles = {light: profile for light, path in pictures.items() if (profile := read_profile(path)) is not None}
+    return Capture(white, black, projector_size, pattern, columns, rows, textures, fringes, profiles)
 
 
-def _write_picture(image: Array, path: Path) -> None:
+def _write_picture(image: Array, path: Path, profile: bytes | None = None) -> None:
     require_picture(image, path.name)
-    path.write_bytes(encoded(image, path.suffix))
+    path.write_bytes(picture_bytes(image, path.suffix, profile))
 
 
 def _write_frames(frames: Frames, folder: Path, like: Array, names: list[str]) -> None:
@@ -256,10 +259,10 @@ def write_capture(capture: Capture, folder: Path) -> None:
     row_names = [f"{i:0{digits}d}.png" for i in range(first_row, first_row + n_rows)]
     with replacing_folder(Path(folder)) as new:
         (new / "capture.toml").write_text(_settings(capture), encoding="utf-8")
-        _write_picture(capture.white, new / "white.png")
+        _write_picture(capture.white, new / "white.png", capture.profiles.get(WHITE))
         _write_picture(capture.black, new / "black.png")
         for light, image in capture.textures.items():
             (new / "textures").mkdir(exist_ok=True)
-            _write_picture(image, new / "textures" / f"{light}.png")
+            _write_picture(image, new / "textures" / f"{light}.png", capture.profiles.get(light))
         _write_frames(capture.columns, new / ("gray" if gray else "columns"), capture.white, column_names)
         _write_frames(capture.rows, new / ("gray" if gray else "rows"), capture.white, row_names)

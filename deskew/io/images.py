@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from deskew.errors import InputError, require
-from deskew.io import png, tiff
+from deskew.io import png, pngtags, tiff
+from deskew.io.colour import is_profile
 from deskew.io.files import read_bytes, read_head, write_bytes
 from deskew.types import Array, Size
 
@@ -148,6 +150,22 @@ def encoded(image: Array, suffix: str) -> bytes:
     return bytes(data)
 
 
+def picture_bytes(
+    image: Array, suffix: str, profile: bytes | None = None, dpi: tuple[float, float] | None = None
+) -> bytes:
+    """Encode a picture with its colour profile and resolution; parameters as in :func:`write_image`."""
+    data = encoded(image, suffix)
+    if profile is None and dpi is None:
+        return data
+    channels = 1 if image.ndim == 2 else 3
+    fits = profile is None or is_profile(profile, channels)
+    require(fits, "profile", f"be the ICC profile of a picture with {channels} channels", "another")
+    finite = dpi is None or all(math.isfinite(value) and value > 0 for value in dpi)
+    require(finite, "dpi", "be two finite numbers above 0", dpi)
+    tagged = pngtags.tagged if suffix == ".png" else tiff.tagged
+    return tagged(data, profile, dpi)
+
+
 def require_picture(image: Array, name: str) -> None:
     """Raise an InputError unless `image` is non-empty, grey or colour, of 8 or 16 bits."""
     require(image.dtype in (np.uint8, np.uint16), name, "have 8 or 16 bits a sample", image.dtype)
@@ -155,17 +173,30 @@ def require_picture(image: Array, name: str) -> None:
     require(good, name, "be non-empty (height, width) or (height, width, 3)", image.shape)
 
 
-def write_image(image: Array, path: Path) -> None:
+def write_image(
+    image: Array, path: Path, *, profile: bytes | None = None, dpi: tuple[float, float] | None = None
+) -> None:
     """Write a picture, (height, width) or (height, width, 3) in RGB order, keeping its 8 or 16 bits.
+
+    Parameters
+    ----------
+    image : (height, width[, 3]) array
+        uint8 or uint16.
+    path : Path
+        PNG or TIFF.
+    profile : bytes, optional
+        Its ICC colour profile, as :func:`deskew.io.read_profile` found it.
+    dpi : (x, y), optional
+        Resolution [dots per inch].
 
     Raises
     ------
     InputError
-        If it is anything else, or the suffix is not a PNG's or TIFF's.
+        If it is anything else, the suffix is not a PNG's or TIFF's, or the profile is of another kind of picture.
     StepError
         If the file system refuses.
     """
     suffix = path.suffix.lower()
     require(suffix in IMAGE_SUFFIXES, str(path), f"end in {' or '.join(IMAGE_SUFFIXES)}", suffix or "no suffix")
     require_picture(image, "image")
-    write_bytes(encoded(image, suffix), path)
+    write_bytes(picture_bytes(image, suffix, profile, dpi), path)

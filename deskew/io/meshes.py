@@ -157,16 +157,21 @@ def read_mesh(path: Path) -> Mesh:
         raise InputError(f"`{path}` must be a valid mesh, got {shown(str(error))}.") from error
 
 
-def _ply_bytes(mesh: Mesh) -> bytes:
+def _ply_bytes(mesh: Mesh, picture: str | None) -> bytes:
     import trimesh
 
     solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     if mesh.texture is not None:
-        solid.vertex_attributes["s"], solid.vertex_attributes["t"] = mesh.texture.T
-    return bytes(solid.export(file_type="ply", vertex_normal=False))
+        # MeshLab passes over them if they are doubles.
+        solid.vertex_attributes["s"], solid.vertex_attributes["t"] = mesh.texture.T.astype(np.float32)
+    data = bytes(solid.export(file_type="ply", vertex_normal=False))
+    if picture is None:
+        return data
+    magic, form, rest = data.split(b"\n", 2)
+    return b"\n".join([magic, form, f"comment TextureFile {picture}".encode(), rest])
 
 
-def write_mesh(mesh: Mesh, path: Path) -> None:
+def write_mesh(mesh: Mesh, path: Path, picture: str | None = None) -> None:
     """Write a mesh, vertices in their order, whole or not at all.
 
     Parameters
@@ -174,8 +179,11 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
     mesh : Mesh
         Vertices that no face uses stay.
     path : Path
-        A PLY is binary: positions are float32, good to 0.0001 mm at a metre, and texture coordinates become the vertex
-        properties ``s`` and ``t`` that MeshLab and Blender read. An OBJ is text that reads back bit for bit.
+        A PLY is binary: positions and texture coordinates are float32, good to 0.0001 mm at a metre; the latter become
+        the vertex properties ``s`` and ``t`` that MeshLab and Blender read. An OBJ is text that reads back bit for bit.
+    picture : str, optional
+        Name of the texture's picture beside it: a PLY names it in a comment, as MeshLab wants it, an OBJ in a material
+        file of its own name, ``.mtl``, which is written too.
 
     Raises
     ------
@@ -187,5 +195,13 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     require(suffix in MESH_SUFFIXES, str(path), f"end in {' or '.join(MESH_SUFFIXES)}", suffix or "no suffix")
-    text = suffix == ".obj"
-    write_bytes(obj.formatted(mesh.vertices, mesh.faces, mesh.texture).encode() if text else _ply_bytes(mesh), path)
+    plain = picture is None or (picture.isprintable() and path.name.isprintable())
+    require(plain, shown(path.name), "be of printable characters, as the mesh names its picture", "others")
+    if suffix == ".ply":
+        write_bytes(_ply_bytes(mesh, picture), path)
+        return
+    material = None if picture is None else path.with_suffix(".mtl")
+    if material is not None:
+        write_bytes(obj.material(str(picture)).encode(), material)
+    library = None if material is None else material.name
+    write_bytes(obj.formatted(mesh.vertices, mesh.faces, mesh.texture, library).encode(), path)

@@ -104,7 +104,15 @@ def _lines(keyword: str, rows: Array) -> Iterable[str]:
     return (f"{keyword} {' '.join(map(repr, row))}\n" for row in rows.tolist())
 
 
-def formatted(vertices: Floats, faces: Array, texture: Floats | None) -> str:
+MATERIAL = "page"
+
+
+def material(picture: str) -> str:
+    """Write the text of a material file: a matt surface that shows a picture."""
+    return f"newmtl {MATERIAL}\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {picture}\n"
+
+
+def formatted(vertices: Floats, faces: Array, texture: Floats | None, library: str | None = None) -> str:
     """Write OBJ text that :func:`parsed` reads back bit for bit.
 
     Parameters
@@ -115,8 +123,11 @@ def formatted(vertices: Floats, faces: Array, texture: Floats | None) -> str:
         Indices from 0.
     texture : (V, 2) array or None
         Texture coordinate of each vertex.
+    library : str, optional
+        Name of the file that holds :func:`material`.
     """
-    lines = [*_lines("v", np.asarray(vertices, dtype=np.float64))]
+    lines = [] if library is None else [f"mtllib {library}\n", f"usemtl {MATERIAL}\n"]
+    lines += _lines("v", np.asarray(vertices, dtype=np.float64))
     if texture is not None:
         lines += _lines("vt", np.asarray(texture, dtype=np.float64))
     corner = "{0}" if texture is None else "{0}/{0}"

@@ -10,6 +10,7 @@ import numpy as np
 from deskew.errors import InputError, require
 from deskew.io.arrays import read_arrays, require_arrays, write_arrays
 from deskew.io.captures import LIGHT_NAME
+from deskew.io.colour import is_profile
 from deskew.io.files import shown, write_bytes
 from deskew.io.images import encoded, read_raster, require_picture
 from deskew.types import Array, DepthMap, Floats, Pinhole, Reason, Scan, Sheet
@@ -126,6 +127,23 @@ def _named(error: InputError, path: Path) -> InputError:
     return error if str(path) in message else InputError(f"`{path}`: {message}")
 
 
+def _text(letters: Array) -> str:
+    text = letters.astype(np.uint8).tobytes().decode("utf-8", "replace")
+    require(
+        bool(text) and len(text) <= 64 and text.isprintable(), "unit", "be 1 to 64 printable characters", shown(text)
+    )
+    return text
+
+
+def _profiles(arrays: Mapping[str, Array], images: Mapping[str, Array]) -> dict[str, bytes]:
+    """Colour profiles of the images that have one."""
+    found = {n.removeprefix("profile_"): v.tobytes() for n, v in arrays.items() if n.startswith("profile_")}
+    for light, icc in found.items():
+        fits = light in images and is_profile(icc, 1 if images[light].ndim == 2 else 3)
+        require(fits, f"profile_{shown(light)}", "be the ICC profile of that light's image", f"{len(icc)} bytes")
+    return found
+
+
 def write_scan(scan: Scan, path: Path) -> None:
     """Write a scan as NPZ: images, depth, camera, sheet and outline, everything that a restoration may see.
 
@@ -144,6 +162,8 @@ def write_scan(scan: Scan, path: Path) -> None:
         "sheet_vertices": scan.sheet.vertices,
         "outline": np.asarray(scan.outline),
         "filled_fraction": np.array(scan.filled_fraction),
+        "unit": np.frombuffer(scan.unit.encode(), np.uint8),
+        **{f"profile_{light}": np.frombuffer(icc, np.uint8) for light, icc in scan.profiles.items()},
     }
     if scan.sheet.stiffness is not None:
         arrays["sheet_stiffness"] = scan.sheet.stiffness
@@ -187,6 +207,17 @@ def read_scan(path: Path) -> Scan:
         )
         filled = float(arrays["filled_fraction"])
         require(0 <= filled <= 1, "filled_fraction", "be in [0, 1]", filled)
-        return Scan(images, _depth(arrays, path), camera, sheet, outline, filled_fraction=filled)
+        unit = _text(arrays["unit"]) if "unit" in arrays else "mm"
+        profiles = _profiles(arrays, images)
+        return Scan(
+            images,
+            _depth(arrays, path),
+            camera,
+            sheet,
+            outline,
+            filled_fraction=filled,
+            unit=unit,
+            profiles=profiles,
+        )
     except InputError as error:
         raise _named(error, path) from error

@@ -13,6 +13,7 @@ from deskew.restoration.combine import (
     require_combination,
 )
 from deskew.restoration.registration import Registration, register
+from deskew.restoration.resolution import dots_per_inch, pixels_per_unit
 from deskew.restoration.restorers import dewarp_by, restore_by
 from deskew.restoration.sampling import read_at
 from deskew.restoration.shading import UNSHADED, divide_by_local_white, remove_shading, surface_points
@@ -28,10 +29,12 @@ __all__ = [
     "combined",
     "dewarp_by",
     "divide_by_local_white",
+    "dots_per_inch",
     "lights_of",
     "maximum",
     "mean",
     "pictures_of",
+    "pixels_per_unit",
     "principal_components",
     "ratio",
     "read_at",

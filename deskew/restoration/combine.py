@@ -94,12 +94,13 @@ def principal_components(images: Sequence[Array], page: npt.NDArray[np.bool_]) -
     return Components(scores, loadings, variances[::-1] / variances.sum())
 
 
-def as_picture(values: Floats, page: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-    """Spread computed values (height, width) over 1 to 255, the few extreme ones clipped; 0 outside the page."""
+def as_picture(values: Floats, page: npt.NDArray[np.bool_], dtype: npt.DTypeLike = np.uint8) -> Array:
+    """Spread computed values (height, width) over 1 to 255, or 65535 in 16 bits, a few extremes clipped; else 0."""
     _require_page(page, values)
     low, high = np.percentile(values[page], [_CLIPPED, 100.0 - _CLIPPED])
     spread = np.clip((values - low) / max(float(high - low), 1e-12), 0.0, 1.0)
-    return np.where(page, np.rint(1.0 + 254.0 * spread), 0.0).astype(np.uint8)
+    white = float(np.iinfo(dtype).max)
+    return np.asarray(np.where(page, np.rint(1.0 + (white - 1.0) * spread), 0.0).astype(dtype))
 
 
 def require_combination(how: str, lights: Collection[str]) -> None:
@@ -127,7 +128,7 @@ def pictures_of(how: str, lights: Sequence[str]) -> list[str]:
     return [f"component-{k + 1}" for k in range(len(lights))] if how == "components" else [how]
 
 
-def combined(images: Mapping[str, Array], page: npt.NDArray[np.bool_], how: str) -> dict[str, npt.NDArray[np.uint8]]:
+def combined(images: Mapping[str, Array], page: npt.NDArray[np.bool_], how: str) -> dict[str, Array]:
     """Make pictures of one combination, by name.
 
     Parameters
@@ -141,20 +142,23 @@ def combined(images: Mapping[str, Array], page: npt.NDArray[np.bool_], how: str)
 
     Returns
     -------
-    dict of name to (height, width) uint8 array
-        Spread over the grey levels by :func:`as_picture`.
+    dict of name to (height, width) array
+        Spread over the grey levels by :func:`as_picture`: 16 bits if any of the images has as many, else 8.
     """
     require_combination(how, list(images))
+    depth = np.uint16 if any(image.dtype == np.uint16 for image in images.values()) else np.uint8
+    if depth is np.uint16:  # white is white in 8 bits as in 16
+        images = {name: image * np.uint16(257) if image.dtype == np.uint8 else image for name, image in images.items()}
     every = list(images.values())
     if how == "components":
         scores = principal_components(every, page).scores
         names = pictures_of(how, list(images))
-        return {name: as_picture(score, page) for name, score in zip(names, scores, strict=True)}
+        return {name: as_picture(score, page, depth) for name, score in zip(names, scores, strict=True)}
     parts = _ratio_parts(how)
     if parts is not None:
         over, under = parts
-        return {f"ratio-{over}-{under}": as_picture(ratio(images[over], images[under], page), page)}
-    return {how: as_picture(mean(every) if how == "mean" else maximum(every), page)}
+        return {f"ratio-{over}-{under}": as_picture(ratio(images[over], images[under], page), page, depth)}
+    return {how: as_picture(mean(every) if how == "mean" else maximum(every), page, depth)}
 
 
 def _ratio_parts(how: str) -> tuple[str, str] | None:

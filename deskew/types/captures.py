@@ -120,6 +120,8 @@ class Capture:
     fringes : tuple of Fringe
         Of the phase patterns, the same for columns and rows: one of an even period for `GRAY_PHASE`; for `MULTI_PHASE`
         two or more, the longest period first and no shorter than the projector's larger side.
+    profiles : mapping of light name to bytes
+        ICC colour profiles of the white image and the textures that have one; carried along, never applied.
     """
 
     white: Array
@@ -130,6 +132,7 @@ class Capture:
     rows: Frames
     textures: Mapping[str, Array] = field(default_factory=dict)
     fringes: Fringes = ()
+    profiles: Mapping[str, bytes] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_size("projector_size", self.projector_size)

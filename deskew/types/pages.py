@@ -176,6 +176,10 @@ class Scan:
         What the capture's frames say about the projector; a file does not keep it.
     filled_fraction : float
         Share of the sheet's inner vertices whose depth was not measured but carried over from the surroundings.
+    unit : str
+        Unit of every length, the calibration's.
+    profiles : mapping of light name to bytes
+        ICC colour profiles of the images that have one.
     """
 
     images: Mapping[str, Array]
@@ -185,6 +189,8 @@ class Scan:
     outline: Floats
     projector: ProjectorCheck = field(default_factory=ProjectorCheck)
     filled_fraction: float = 0.0
+    unit: str = "mm"
+    profiles: Mapping[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,8 @@ from experiments.reporting.claims.measures import Evidence
 from experiments.reporting.claims.page import claims_page
 from experiments.reporting.claims.paper import CLAIMS
 from experiments.reporting.croissant import croissant_text
+from experiments.reporting.decisions import decisions_page
+from experiments.reporting.headlines import with_results
 from experiments.reporting.readme import with_tables
 from experiments.reporting.scaling import Measured, with_figures
 
@@ -30,8 +32,10 @@ def _measured(root: Path) -> Measured:
 
 
 GENERATED: Mapping[str, Callable[[Path], str]] = {
-    "README.md": lambda root: with_tables((root / "README.md").read_text(), root / "reports"),
+    "README.md": lambda root: with_results((root / "README.md").read_text(), Evidence(root / "reports")),
     "ARTIFACT.md": lambda root: with_artifact((root / "ARTIFACT.md").read_text(), root / "reports"),
+    "docs/adr/README.md": lambda root: decisions_page(root / "docs/adr"),
+    "docs/results.md": lambda root: with_tables((root / "docs/results.md").read_text(), root / "reports"),
     "docs/scaling.md": lambda root: with_figures((root / "docs/scaling.md").read_text(), _measured(root)),
     "reports/CLAIMS.md": lambda root: claims_page(CLAIMS, Evidence(root / "reports")),
     "reports/NULLS.md": lambda root: nulls_page(Evidence(root / "reports")),

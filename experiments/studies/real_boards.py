@@ -15,14 +15,13 @@ from deskew.acquisition import BoardView, DenoiseSettings, DepthSettings, InkSet
 from deskew.errors import InputError, require
 from deskew.plugins import Kind
 from deskew.recipes import Recipe
-from deskew.types import Array, Board, Calibration, Capture, DepthMap, Floats, Pinhole, Restoration, Scan, Sheet
+from deskew.types import Array, Board, Calibration, Capture, Floats, Pinhole, Restoration, Scan, Sheet
 from experiments.reporting import Column, Layout, Montage
 from experiments.settings import Config
 from experiments.studies.bench import calibration_figures
 from experiments.studies.flattened import flattening_figures
 from experiments.studies.methods import method_of, require_methods
 from experiments.studies.recipes import methods_by_recipe
-from experiments.studies.scanned import scanned_points
 from experiments.studies.study import AbsentError, Study
 from experiments.studies.trial_sheets import refuse_sheets
 from experiments.trials import Outcome, Recorder, TrialKey, content_digest, trial_keys
@@ -138,18 +137,17 @@ def _measure_board(
     with record.stage("scan"):
         decoded = pipeline.decode(capture)
         depth = acquisition.depth_map(calibration, decoded, _DEPTH)
-    seen = _to_view(calibration.camera, depth.camera, view.corners)
-    points = scanned_points(depth, seen, _RADIUS_PX)
-    errors = acquisition.length_errors(points, acquisition.board_points(BOARD), _LENGTH_MIN)
-    deviation = acquisition.plane_deviation(points[np.isfinite(points).all(axis=1)])
-    figures = {"length_error_units": float(np.sqrt((errors**2).mean())), "plane_mean_abs_units": deviation.mean_abs_mm}
-    record.add("left_out", "-", figures | {"depth_coverage": _covered(depth, seen)})
+    found = acquisition.board_accuracy(BOARD, view.corners, calibration.camera, depth, _LENGTH_MIN, _RADIUS_PX)
+    figures = {"length_error_units": found.length_rms_mm, "plane_mean_abs_units": found.plane.mean_abs_mm}
+    record.add("left_out", "-", figures | {"depth_coverage": found.coverage})
+    seen = acquisition.corners_in_view(calibration.camera, depth.camera, view.corners)
+    points = acquisition.scanned_points(depth, seen, _RADIUS_PX)
     R, t = _onto_bed(calibration.camera, points)
     record.add("left_out", "-", _as_rows(R, t))
     on_bed = replace(
         calibration, camera=_in_world(calibration.camera, R, t), projector=_in_world(calibration.projector, R, t)
     )
-    outline = acquisition.straight_outline(_border(seen))
+    outline = acquisition.straight_outline(acquisition.board_border(BOARD, seen))
     for recipe, methods in methods_by_recipe(config, capture.pattern).items():
         with record.stage("mesh"):
             scan = _meshed(config, recipe, capture, on_bed, outline)
@@ -191,25 +189,6 @@ def _measure_restored(record: Recorder, method: str, sheet: Sheet, restored: Res
     if restored.flattened is not None:
         figures |= flattening_figures(sheet, restored.flattened)
     record.add("restored", method, figures)
-
-
-def _to_view(camera: Pinhole, view: Pinhole, raw: Floats) -> Floats:
-    return np.asarray(projection.undistort(camera, raw) @ view.K[:2, :2].T + view.K[:2, 2])
-
-
-def _border(corners: Floats) -> Floats:
-    """Return the outer corners (4, 2) [px] of the board's outermost squares, a homography beyond the inner corners."""
-    nx, ny = BOARD.shape
-    grid = np.stack(np.meshgrid(np.arange(nx), np.arange(ny)), axis=-1).reshape(-1, 2).astype(np.float64)
-    homography, _ = cv2.findHomography(grid, corners)
-    rim = np.array([(-0.9, -0.9), (nx - 0.1, -0.9), (nx - 0.1, ny - 0.1), (-0.9, ny - 0.1)])
-    return np.asarray(cv2.perspectiveTransform(rim.reshape(-1, 1, 2), homography)).reshape(4, 2)
-
-
-def _covered(depth: DepthMap, corners: Floats) -> float:
-    """Return the share of the board's pixels that have depth, its black squares included."""
-    board = cv2.fillConvexPoly(np.zeros(depth.z.shape, np.uint8), np.rint(_border(corners)).astype(np.int32), (1,))
-    return float(np.isfinite(depth.z[board > 0]).mean())
 
 
 def _onto_bed(camera: Pinhole, points: Floats) -> tuple[Floats, Floats]:

@@ -14,7 +14,6 @@ from deskew.acquisition import DepthSettings
 from deskew.recipes import Recipe
 from deskew.types import Calibration, Capture, Correspondence, DepthMap, Floats
 from experiments.studies.bench import Bench
-from experiments.studies.scanned import scanned_points
 from experiments.studies.views import seen_corners
 
 PROBED_DEG = 50.0
@@ -141,5 +140,5 @@ def _length_errors(target: Target, page: Checkerboard, depth: DepthMap, calibrat
     corners = page.corners.reshape(-1, 2)
     seeds = seen_corners(target.truth, corners, calibration.camera, depth.camera)
     image = restoration.undistorted_view(target.capture.white, calibration.camera)
-    found = scanned_points(depth, acquisition.refine_saddle(image, seeds), _RADIUS_PX)
+    found = acquisition.scanned_points(depth, acquisition.refine_saddle(image, seeds), _RADIUS_PX)
     return acquisition.length_errors(found, corners, LENGTH_MIN_MM)

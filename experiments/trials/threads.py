@@ -6,23 +6,12 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-import cv2
-from threadpoolctl import threadpool_limits
+from deskew.threads import one_thread
+
+__all__ = ["ONE_THREAD", "environment", "n_cores", "one_thread"]
 
 # What a process that carries trials out must find in its environment before it imports anything.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Hold linear algebra and OpenCV to one thread during the block."""
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        with threadpool_limits(limits=1):
-            yield
-    finally:
-        cv2.setNumThreads(before)
 
 
 @contextmanager

@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -191,3 +192,16 @@ def test_a_board_whose_pixels_are_all_wrong_is_outvoted_and_told(shift_px):
     assert calibration.convergence["rejected_share"] == pytest.approx(1 / 9, abs=0.01)
     assert calibration.residuals["held_out_projector_rms_px"] < 0.1
     assert 0 < calibration.residuals["held_out_length_rms"] < 0.1
+
+
+def test_the_same_boards_give_the_same_bytes_on_any_number_of_threads():
+    views, before = _views(0.3, 0.1, 100, 3), cv2.getNumThreads()
+    found = set()
+    try:
+        for n in (1, 4, 4, 4, 4, 4):
+            cv2.setNumThreads(n)
+            devices = calibrate(BOARD, views)
+            found.add(devices.camera.K.tobytes() + devices.projector.K.tobytes())
+    finally:
+        cv2.setNumThreads(before)
+    assert len(found) == 1

@@ -17,6 +17,7 @@ import pytest
 
 import deskew
 from deskew import io
+from deskew.acquisition import DepthSettings
 from deskew.cli import main
 from deskew.errors import StepError
 from deskew.recipes import BEST, PAPER, Recipe
@@ -78,16 +79,25 @@ class StandIn:
         return replace(CALIBRATION, n_poses=len(poses))
 
     def scan_by(
-        self, recipe: Recipe, page: Capture, calibration: Calibration, *, shape: tuple[int, int], mask: Any
+        self,
+        recipe: Recipe,
+        page: Capture,
+        calibration: Calibration,
+        *,
+        shape: tuple[int, int],
+        mask: Any,
+        depth: DepthSettings | None = None,
+        max_hole_px: float = 12.0,
     ) -> Scan:
-        frames = [*page.columns, *page.rows]
-        self._step("scan", recipe=recipe, frames=frames, calibration=calibration, shape=shape, mask=mask)
+        frames, gates = [*page.columns, *page.rows], (depth, max_hole_px)
+        self._step("scan", recipe=recipe, frames=frames, calibration=calibration, shape=shape, mask=mask, gates=gates)
         reason = np.zeros((8, 12), np.uint8)
         reason[0, :3] = 1
-        depth = DepthMap(np.where(reason == 0, 9.0, np.nan), reason, CAMERA)
+        measured = DepthMap(np.where(reason == 0, 9.0, np.nan), reason, CAMERA)
         x, y = np.meshgrid(np.linspace(-1, 1, shape[1]), np.linspace(1, -1, shape[0]))
         sheet = Sheet(np.stack([x, y, 0 * x], -1))
-        return Scan({"white": page.white, **page.textures}, depth, CAMERA, sheet, np.zeros((4, 2)), self.check)
+        images, outline = {"white": page.white, **page.textures}, np.zeros((4, 2))
+        return Scan(images, measured, CAMERA, sheet, outline, self.check, profiles=page.profiles)
 
     def with_stiffness(self, scan: Scan, materials: io.StiffnessMap) -> Scan:
         self._step("stiffness", materials=materials)
@@ -191,6 +201,17 @@ def test_a_page_is_scanned_as_its_method_asks_unless_told_otherwise(
     assert steps.calls["scan"]["recipe"] == recipe
 
 
+@pytest.mark.parametrize("line", ["scan page -c c.json -o out/s.npz", "run page -c c.json -o out/r.png"])
+def test_what_is_believed_of_depth_can_be_said(
+    here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str], line: str
+) -> None:
+    assert run(line, capsys)[0] == 0
+    assert steps.calls["scan"]["gates"] == (DepthSettings(), 12.0)
+    assert run(f"{line} --heights -1500 1500 --neighbour 6 --jump 15 --hole 100", capsys)[0] == 0
+    wanted = DepthSettings(z_min_mm=-1500.0, z_max_mm=1500.0, neighbour_mm=6.0, jump_mm=15.0)
+    assert steps.calls["scan"]["gates"] == (wanted, 100.0)
+
+
 def test_a_scanned_mesh_carries_its_place_in_the_white_image(
     here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -200,14 +221,22 @@ def test_a_scanned_mesh_carries_its_place_in_the_white_image(
     # x = 10 * X / 9 + 5.5 px of 12, its centre at + 0.5; y likewise of 8, and t runs upwards.
     s, t = (5.5 + 10 / 9 + 0.5) / 12, 1 - (3.5 + 10 / 9 + 0.5) / 8
     assert mesh.texture is not None
-    assert np.allclose(mesh.texture, [[1 - s, t], [s, t], [1 - s, 1 - t], [s, 1 - t]], rtol=0, atol=1e-12)
+    assert np.allclose(mesh.texture, [[1 - s, t], [s, t], [1 - s, 1 - t], [s, 1 - t]], rtol=0, atol=1e-7)
 
 
 def test_run_goes_from_a_folder_to_a_page(here: Path, steps: StandIn, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run("run page -c c.json -o out/r.tif --method paper_rk4 --json", capsys)
     assert (code, err) == (0, "")
-    figures = {"restored": "out/r.tif", "method": "paper_rk4", "status": "at_rest", "steps": 7, "spring_energy": None}
-    assert json.loads(out) == figures
+    figures = json.loads(out)
+    assert figures.pop("dpi") == pytest.approx([25.4 * 10 / 9] * 2)  # a focal length of 10 px, 9 mm away
+    assert figures == {
+        "restored": "out/r.tif",
+        "method": "paper_rk4",
+        "filled_fraction": 0.0,
+        "status": "at_rest",
+        "steps": 7,
+        "spring_energy": None,
+    }
     assert steps.calls["restore"]["method"] == "paper_rk4"
     assert len(steps.calls["scan"]["frames"]) == 12
     assert np.array_equal(io.read_image(here / "out" / "r.tif"), capture().white[::-1])
@@ -330,7 +359,7 @@ def test_accuracy_measures_the_page_and_not_the_desk(
     z[4, 6] = 9.5
     depth = DepthMap(z, np.zeros((8, 12), np.uint8), CAMERA)
     corners = np.array([[4.0, 1], [10, 1], [10, 6], [4, 6]])
-    monkeypatch.setattr(acquisition, "depth_map", lambda devices, seen: depth)
+    monkeypatch.setattr(acquisition, "depth_map", lambda devices, seen, settings: depth)
     monkeypatch.setattr(acquisition, "page_outline", lambda *images, depth: SimpleNamespace(corners=corners))
     code, out, err = run("accuracy page page -c c.json --json", capsys)
     assert (code, err) == (0, "")
@@ -419,7 +448,8 @@ WRONG_LINES = {
     "no calibration": ("run page -o out/r.png", "Missing option '--calibration'"),
     "no output": ("run page -c c.json", "Missing option '--output'"),
     "no planes": ("accuracy -c c.json", "Missing argument 'CAPTURE...'"),
-    "two captures": ("run page page -c c.json -o out/r.png", "unexpected extra argument"),
+    "two captures of one name": ("run page page -c c.json -o out", "`CAPTURE...` must be folders of different names"),
+    "two captures, one picture": ("run page board -c c.json -o out/r.png/s", "`out/r.png/s` must be a folder, for"),
     "shape of one": ("run page -c c.json -o out/r.png --shape 45", "'--shape' requires 2 arguments"),
     "shape of words": ("run page -c c.json -o out/r.png --shape 45 x", "Invalid value for '--shape'"),
     "shape of fractions": ("run page -c c.json -o out/r.png --shape 4.5 4", "Invalid value for '--shape'"),
@@ -550,9 +580,9 @@ def test_the_module_ends_with_the_exit_code() -> None:
 
 def test_figures_that_nobody_takes_are_one_line_that_says_what_was_written(here: Path) -> None:
     program = (
-        "import sys; from deskew.cli import main, printing, restoring\n"
-        "def restore(found, method, wanted, as_json, settings):\n"
-        "    wanted.output.touch(); printing.report({}, as_json, wanted.output)\n"
+        "import sys; from deskew.cli import main, restoring\n"
+        "def restore(found, method, wanted, settings):\n"
+        "    wanted.output.touch(); return {}, [wanted.output]\n"
         "restoring.restore_page = restore\n"
         "sys.exit(main(['restore', 'scan.npz', '-o', 'out/r.png']))\n"
     )

@@ -217,3 +217,22 @@ def test_a_wrong_line_is_one_line_and_code_2(here: Path, deskew: Command, case: 
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
     assert list((here / "out").iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", ["ply", "obj"])
+def test_a_flat_mesh_names_its_texture_as_seen_from_itself(
+    deskew: Command, page: Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "flat").mkdir()
+    write_mesh(page, tmp_path / "page.obj")
+    write_image(np.zeros((3, 4), np.uint8), tmp_path / "page.png")
+    assert deskew(f"flatten page.obj -o flat/page.{suffix} --noise 0 --picture page.png")[0] == 0
+    named = tmp_path / "flat" / ("page.mtl" if suffix == "obj" else "page.ply")
+    assert b"../page.png\n" in named.read_bytes()
+    code, out, err = deskew("flatten page.obj -o flat/b.ply --noise 0 --picture none.png")
+    assert (code, out, err) == (2, "", "deskew: `none.png` must be a file, got nothing there.\n")
+    write_mesh(Mesh(page.vertices, page.faces), tmp_path / "bare.obj")
+    code, _, err = deskew("flatten bare.obj -o flat/b.ply --noise 0 --picture page.png")
+    assert (code, "`--picture` must come with a mesh that has texture coordinates" in err) == (2, True)
+    assert not (tmp_path / "flat" / "b.ply").exists()

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import data_synth as ds
-from data_synth.captures import main, write_example
+from data_synth.captures import main, scaled, write_example
 from deskew.errors import InputError
 from deskew.io import read_board, read_capture
-from deskew.types import Pinhole
+from deskew.types import PatternKind, Pinhole
 
 
 def smaller(device: Pinhole, factor: int) -> Pinhole:
@@ -43,16 +43,41 @@ def test_an_example_reads_back_as_what_the_rig_photographs(tmp_path: Path, rig: 
         assert np.array_equal(ours, theirs)
 
 
+def test_lights_planes_and_patterns_are_written_on_request(tmp_path: Path, rig: ds.Rig) -> None:
+    gray = PatternKind.GRAY_CODE
+    write_example(rig, tmp_path / "example", n_poses=3, pattern=gray, n_planes=2, lights=True)
+    wanted = ["board", "flat", "page_00", "plane_01"]
+    assert sorted(p.name for p in (tmp_path / "example").iterdir()) == wanted
+    page = read_capture(tmp_path / "example" / "page_00")
+    assert page.pattern is gray
+    assert list(page.textures) == ["above", "raking", "uv", "backlight"]
+    planes = [read_capture(tmp_path / "example" / name).white for name in ("flat", "plane_01")]
+    assert len({plane.tobytes() for plane in planes}) == 2
+    assert all((plane[[0, -1]] < plane.max() / 4).all() for plane in planes[1:])  # desk shows all round
+
+
+def test_a_scaled_bench_sees_the_same_with_fewer_pixels() -> None:
+    rig, small = ds.default_rig(), scaled(ds.default_rig(), 0.25)
+    assert (small.camera.size, small.projector.size) == ((160, 120), (256, 192))
+    # The middle of a block of 4 x 4 pixels is the small pixel's centre.
+    block = (smaller(rig.camera, 4), smaller(rig.projector, 4))
+    for found, wanted in zip((small.camera, small.projector), block, strict=True):
+        assert np.allclose(found.K, wanted.K, rtol=1e-12)
+    with pytest.raises(InputError, match=r"`scale` must be in \[0.1, 1\], got 2"):
+        scaled(rig, 2)
+
+
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
         ({"seed": -1}, "`seed` must be at least 0, got -1"),
         ({"n_pages": 0}, r"`n_pages` must be in \[1, 100\], got 0"),
+        ({"n_planes": 0}, r"`n_planes` must be in \[1, 100\], got 0"),
         ({"n_poses": 2}, r"`n` must be in \[3, 12\], got 2"),
         ({"slope_p90_deg": 60.0}, r"`slope_p90_deg` must be in \[1, 45\], got 60"),
         ({"slope_p90_deg": float("nan")}, r"`slope_p90_deg` must be in \[1, 45\], got nan"),
     ],
-    ids=["seed", "pages", "poses", "slope", "slope NaN"],
+    ids=["seed", "pages", "planes", "poses", "slope", "slope NaN"],
 )
 def test_a_wrong_setting_leaves_nothing(tmp_path: Path, rig: ds.Rig, setting: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):

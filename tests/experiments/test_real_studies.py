@@ -52,8 +52,17 @@ def test_corner_distance_measures_every_condition_by_both_detectors(tmp_path: Pa
     assert rows["control", "-"].keys() == CORNERS | {"detector_rms_px"}
     mesh = {"mesh_filled_fraction", "mesh_cut_quads"}
     assert rows["unrestored", "-"].keys() == CORNERS | CALIBRATION | SHEET | {"meets_paper"}
-    assert rows["restored/saddle", "paper_rk4"].keys() == CORNERS | {"meets_paper"}
-    more = {"dense_mean_mm", "dense_p95_mm", "dense_max_mm", "page_coverage", "at_rest", "steps", "steps_rejected"}
+    assert rows["restored/saddle", "paper_rk4"].keys() == CORNERS | {"meets_paper", "picture_to_map_rms_mm"}
+    more = {
+        "picture_to_map_rms_mm",
+        "dense_mean_mm",
+        "dense_p95_mm",
+        "dense_max_mm",
+        "page_coverage",
+        "at_rest",
+        "steps",
+        "steps_rejected",
+    }
     more |= {"force_evaluations", "contacts", "strain_rms", "flips", "folded_quads", "meets_paper"}
     # Each method has its own scan.
     assert rows["restored", "paper_euler"].keys() == CORNERS | more | DEPTH | mesh

@@ -11,13 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deskew.io import write_arrays
-from deskew.projection import ideal, pixel_grid, project, rays
-from deskew.types import Array, DepthMap, Floats, Pinhole
+from deskew.projection import ideal, project, rays
+from deskew.types import Array, Floats, Pinhole
 from experiments.program import main
 from experiments.studies import STUDIES, find_study
 from experiments.studies.given_sheets import read_sheet
 from experiments.studies.real_boards import _in_world, _onto_bed
-from experiments.studies.scanned import scanned_points
 from experiments.studies.views import restored_corners
 
 SIZE = (160, 120)
@@ -31,26 +30,6 @@ def plane_depth(pixels: Floats) -> Floats:
     """Return the camera z at which the ideal camera's rays meet the plane NORMAL . x = OFFSET."""
     origin = -CAMERA.R.T @ CAMERA.t
     return np.asarray((OFFSET - origin @ NORMAL) / (rays(ideal(CAMERA), pixels) @ NORMAL))
-
-
-def test_points_of_a_scanned_plane_lie_in_it_at_their_own_pixels() -> None:
-    z = plane_depth(pixel_grid(SIZE))
-    # Holes and wild values, as a scan has them.
-    z[30:32, 40:60] = np.nan
-    z[60, 80] += 40.0
-    depth = DepthMap(z, (~np.isfinite(z)).astype(np.uint8), ideal(CAMERA))
-    places = np.array([(50.25, 33.5), (80.7, 61.2), (100.0, 90.0)])
-    points = scanned_points(depth, places, 6)
-    assert np.abs(points @ NORMAL - OFFSET).max() < 0.02
-    assert np.abs(project(depth.camera, points) - places).max() < 1e-6
-
-
-def test_points_without_a_neighbourhood_are_missing() -> None:
-    z = plane_depth(pixel_grid(SIZE))
-    z[:, :40] = np.nan
-    depth = DepthMap(z, (~np.isfinite(z)).astype(np.uint8), ideal(CAMERA))
-    points = scanned_points(depth, np.array([(10.0, 60.0), (np.nan, 5.0), (100.0, 60.0), (36.0, 60.0)]), 6)
-    assert np.isfinite(points).all(axis=1).tolist() == [False, False, True, False]
 
 
 def test_corners_are_found_where_the_restored_page_shows_them() -> None:

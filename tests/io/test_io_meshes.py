@@ -64,7 +64,8 @@ def test_a_ply_keeps_order_and_textures(tmp_path: Path, shuffled: Mesh) -> None:
     assert np.array_equal(found.faces, shuffled.faces)
     assert found.texture is not None
     used = np.unique(shuffled.faces)
-    assert np.array_equal(found.texture[used], shuffled.texture[used])  # type: ignore[index]
+    wanted = shuffled.texture.astype(np.float32)  # type: ignore[union-attr]
+    assert np.array_equal(found.texture[used], wanted[used])
 
 
 @pytest.mark.parametrize("with_texture", [True, False])
@@ -203,4 +204,52 @@ def test_other_formats_are_refused(tmp_path: Path, shuffled: Mesh) -> None:
         read_mesh(tmp_path / "a.stl")
     with pytest.raises(InputError, match=r"must end in \.obj or \.ply, got \.stl"):
         write_mesh(shuffled, tmp_path / "a.stl")
+    assert list(tmp_path.iterdir()) == []
+
+
+def strict_ply(data: bytes) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Read a PLY by the format's own description (Turk, 1994) as MeshLab and Blender want it, and nothing else."""
+    head, _, body = data.partition(b"end_header\n")
+    lines = head.decode().splitlines()
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
+    comments = [line.removeprefix("comment ") for line in lines if line.startswith("comment ")]
+    declared = [line for line in lines[2:] if not line.startswith("comment ")]
+    assert declared[0].startswith("element vertex ")
+    assert declared[1:6] == [f"property float {name}" for name in "xyzst"]
+    assert declared[6].startswith("element face ")
+    assert declared[7:] == ["property list uchar int vertex_indices"]
+    n, m = int(declared[0].split()[2]), int(declared[6].split()[2])
+    vertices = np.frombuffer(body, "<f4", 5 * n).reshape(n, 5)
+    faces = np.frombuffer(body, np.dtype([("n", "u1"), ("v", "<i4", 3)]), m, 20 * n)
+    assert len(body) == 20 * n + 13 * m
+    assert (faces["n"] == 3).all()
+    return comments, vertices, faces["v"]
+
+
+def test_a_ply_is_what_viewers_read_and_names_its_picture(tmp_path: Path, shuffled: Mesh) -> None:
+    write_mesh(shuffled, tmp_path / "a.ply", "a-white.png")
+    comments, vertices, faces = strict_ply((tmp_path / "a.ply").read_bytes())
+    assert "TextureFile a-white.png" in comments
+    assert shuffled.texture is not None
+    assert np.array_equal(vertices, np.hstack([shuffled.vertices, shuffled.texture]).astype(np.float32))
+    assert np.array_equal(faces, shuffled.faces)
+    found = read_mesh(tmp_path / "a.ply")
+    assert np.array_equal(found.faces, shuffled.faces)
+
+
+def test_an_obj_names_its_picture_in_a_material(tmp_path: Path, shuffled: Mesh) -> None:
+    write_mesh(shuffled, tmp_path / "a.obj", "a-white.png")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mtl", "a.obj"]
+    head = (tmp_path / "a.obj").read_text().splitlines()[:2]
+    assert head == ["mtllib a.mtl", "usemtl page"]
+    material = dict(line.split(" ", 1) for line in (tmp_path / "a.mtl").read_text().splitlines())
+    assert material["newmtl"] == "page"
+    assert material["map_Kd"] == "a-white.png"
+    assert read_mesh(tmp_path / "a.obj").vertices.tobytes() == shuffled.vertices.tobytes()
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply"])
+def test_a_name_that_would_break_the_header_is_refused(tmp_path: Path, shuffled: Mesh, suffix: str) -> None:
+    with pytest.raises(InputError, match="be of printable characters"):
+        write_mesh(shuffled, tmp_path / f"a{suffix}", "a\nelement vertex 0.png")
     assert list(tmp_path.iterdir()) == []

@@ -49,6 +49,22 @@ def repacked(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     np.savez_compressed(path, **arrays)
 
 
+def test_a_scan_keeps_its_unit_and_its_lights_profiles(tmp_path: Path, scan: Scan) -> None:
+    icc = bytearray(range(200))
+    icc[:4], icc[16:20], icc[36:40] = (200).to_bytes(4, "big"), b"RGB ", b"acsp"
+    write_scan(replace(scan, unit="units", profiles={"raking": bytes(icc)}), tmp_path / "s.npz")
+    found = read_scan(tmp_path / "s.npz")
+    assert (found.unit, found.profiles) == ("units", {"raking": bytes(icc)})
+    for change, message in (
+        (lambda arrays: arrays.update(profile_white=arrays["profile_raking"]), "`profile_'white'` must be the ICC"),
+        (lambda arrays: arrays.update(unit=np.zeros(3, np.uint8)), "`unit` must be 1 to 64 printable"),
+    ):
+        write_scan(replace(scan, profiles={"raking": bytes(icc)}), tmp_path / "s.npz")
+        repacked(tmp_path / "s.npz", change)
+        with pytest.raises(InputError, match=message):
+            read_scan(tmp_path / "s.npz")
+
+
 def test_a_depth_map_survives_exactly(tmp_path: Path, depth: DepthMap) -> None:
     write_depth(depth, tmp_path / "d.npz")
     found = read_depth(tmp_path / "d.npz")

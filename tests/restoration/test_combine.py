@@ -58,6 +58,19 @@ def test_a_picture_keeps_the_order_of_values_and_the_pages_border() -> None:
     assert (np.diff(found[PAGE][order].astype(int)) >= 0).all()
 
 
+@pytest.mark.parametrize("how", ["mean", "max", "ratio:uv/white", "components"])
+def test_a_combination_has_the_bits_of_its_finest_light(how: str) -> None:
+    fine = {"white": A * np.uint16(257), "uv": B}
+    eight, sixteen = (combined(images, PAGE, how) for images in ({"white": A, "uv": B}, fine))
+    assert {image.dtype for image in eight.values()} == {np.dtype(np.uint8)}
+    for image in sixteen.values():
+        assert image.dtype == np.uint16
+        assert (image[PAGE].min(), image[PAGE].max()) == (1, 65535)
+    # The same picture in finer steps: where 8 bits are rounded, 16 are within half such a step.
+    for name, image in sixteen.items():
+        assert np.abs(eight[name][PAGE] - (1 + (image[PAGE] - 1.0) * 254 / 65534)).max() <= 0.51
+
+
 def test_every_combination_has_its_name() -> None:
     images = {"white": A, "uv": B, "raking": C}
     for how, names in {
