@@ -269,6 +269,20 @@ BOARDS = (
     Case("a board of pictures that show none", "deskew calibrate board -o out/c.json", (), code=3),
 )
 
+IMPORT = "deskew import {} -o out/board --inner-corners {} --square {}"
+IMPORTS = (
+    Case("an import of no folder", IMPORT.format("nowhere", "9 7", 75), ("`nowhere`", "be a folder", "nothing there")),
+    Case("an import of no poses", IMPORT.format("page", "9 7", 75), ("`page`", "capture_0", "none")),
+    Case(
+        "an import of an empty pose",
+        IMPORT.format(".", "9 7", 75),
+        ("capture_0", "hold 42 frames", "0 images"),
+        lambda here: (here / "capture_0").mkdir(),
+    ),
+    Case("an import of squares of NaN", IMPORT.format("page", "9 7", "nan"), ("`square`", "nan")),
+    Case("an import of two corners", IMPORT.format("page", "2 7", 75), ("`shape`", "at least 3", "2")),
+)
+
 CONTENT = (
     Case("two planes exchanged", RENDERED, (), swapped("rendered/gray/00.png", "rendered/gray/02.png"), code=3),
     Case(
@@ -288,7 +302,7 @@ CONTENT = (
     Case("noise for a capture", RUN, (), code=3),
 )
 
-CASES: tuple[Case, ...] = FRAMES + LINKS + BOARDS + CONTENT
+CASES: tuple[Case, ...] = FRAMES + LINKS + BOARDS + IMPORTS + CONTENT
 
 
 def _resize_camera(here: Path) -> None:

@@ -26,7 +26,7 @@ from random import Random
 from types import FrameType
 
 from deskew import io
-from deskew.errors import DeskewError
+from deskew.errors import DeskewError, InputError
 from tests.badinput import mutations
 from tests.badinput.samples import PAGE_MM, write_samples
 
@@ -83,6 +83,13 @@ def _photograph(folder: Path) -> object:
     return grey_photograph(folder / "photograph.jpg"), true_words(folder / "words.json")
 
 
+def _profile(folder: Path) -> object:
+    found = io.read_profile(folder / "profiled.png")
+    if found is None:  # a damaged one is none
+        raise InputError("no profile")
+    return found
+
+
 def _baseline(folder: Path) -> object:
     from experiments.gate.baseline import read_baseline
 
@@ -111,6 +118,7 @@ READERS = {
     reader.name: reader
     for reader in (
         Reader("png", ("grey.png", "colour.png"), lambda f: [io.read_image(f / n) for n in ("grey.png", "colour.png")]),
+        Reader("profile", ("profiled.png",), _profile),
         Reader("tiff", ("deep.tif",), lambda f: io.read_image(f / "deep.tif")),
         Reader("depth_tiff", ("segment/x.tif",), lambda f: io.read_depth_image(f / "segment/x.tif")),
         Reader("ply", ("bent.ply",), lambda f: io.read_mesh(f / "bent.ply")),
@@ -175,13 +183,15 @@ def _ring(_: int, __: FrameType | None) -> None:
     raise Hung
 
 
-def fuzz(reader: Reader, seed: int, *, seconds: float = float("inf"), n_runs: int | None = None) -> Tally:
-    """Damage a reader's files and read them, for so long or so often."""
+def fuzz(
+    reader: Reader, samples: Path, seed: int, *, seconds: float = float("inf"), n_runs: int | None = None
+) -> Tally:
+    """Damage a copy of a reader's files among the samples and read them, for so long or so often."""
     rng, tally, used = Random(f"{reader.name} {seed}"), Tally(), time.process_time()
     before = signal.signal(signal.SIGPROF, _ring)
     folder = Path(tempfile.mkdtemp(prefix=f"fuzz.{reader.name}."))
     try:
-        write_samples(folder)
+        shutil.copytree(samples, folder, dirs_exist_ok=True)
         whole = {name: (folder / name).read_bytes() for name in reader.files}
         end = time.monotonic() + seconds
         while tally.n_runs != n_runs and time.monotonic() < end:
@@ -248,8 +258,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="[%(default)s]")
     chosen = parser.parse_args(argv)
     n_failed = 0
+    samples = Path(tempfile.mkdtemp(prefix="fuzz.samples."))
+    write_samples(samples)
     for name in chosen.readers or READERS:
-        tally = fuzz(READERS[name], chosen.seed, seconds=chosen.seconds)
+        tally = fuzz(READERS[name], samples, chosen.seed, seconds=chosen.seconds)
         failed = ", ".join(f"{count} x {what}" for what, count in tally.failures.items()) or "no failure"
         print(
             f"{name}: {tally.n_runs} runs, {tally.n_read} read, {tally.seconds_cpu:.0f} s of the processor, "
@@ -257,6 +269,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             flush=True,
         )
         n_failed += bool(tally.failures)
+    shutil.rmtree(samples)
     return int(n_failed > 0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -67,6 +68,13 @@ def capture(pattern: PatternKind = PatternKind.GRAY_CODE, seed: int = 0) -> Capt
     return Capture(planes[0], planes[1], PROJECTOR, pattern, columns, rows, {"uv": pixels(99, (9, 7), 3)}, fringes)
 
 
+def icc_profile() -> bytes:
+    """The header of an RGB profile and nothing else."""
+    head = bytearray(struct.pack(">I", 132) + bytes(128))
+    head[16:20], head[36:40] = b"RGB ", b"acsp"
+    return bytes(head)
+
+
 def scan() -> Scan:
     """A flat page, with stiffness and a cut."""
     reason = np.zeros(SIZE[::-1], np.uint8)
@@ -105,9 +113,8 @@ def write_samples(folder: Path) -> None:
     folder : Path
         Empty. Gets `page` (Gray code), `sweep`, `phase`, `board`, `c.json`, `scan.npz`, `depth.npz`, `bent.obj`,
         `bent.ply`, `unit.obj`, `segment`, `materials.png` and `.toml`, `mask.png`, `grey.png`, `colour.png`,
-        `deep.tif`, `sheet.npz`, `reports/NAME/results.csv`, `seeds.txt`, `photograph.jpg`, `words.json`,
-        `baseline.csv`, `.json` and `.floors.csv`, `map.draft.npz` and an
-        empty folder `out`.
+        `deep.tif`, `profiled.png`, `sheet.npz`, `reports/NAME/results.csv`, `seeds.txt`, `photograph.jpg`,
+        `words.json`, `baseline.csv`, `.json` and `.floors.csv`, `map.draft.npz` and an empty folder `out`.
     """
     io.write_capture(capture(), folder / "page")
     io.write_capture(capture(PatternKind.LINE_SWEEP, 1), folder / "sweep")
@@ -130,6 +137,7 @@ def write_samples(folder: Path) -> None:
     ):
         io.write_image(image, folder / f"{name}.png")
     io.write_image(pixels(5, (64, 48), dtype=np.uint16), folder / "deep.tif")
+    io.write_image(pixels(8, (64, 48), 3), folder / "profiled.png", profile=icc_profile(), dpi=(300.0, 300.0))
     (folder / "materials.toml").write_text("[stiffness]\n0 = 30.0\n255 = 0.3\n")
     io.write_arrays(sheet_arrays(), folder / "sheet.npz")
     for report in ("surfaces", "corner_distance"):
