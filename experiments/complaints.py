@@ -32,13 +32,20 @@ def refuse_arguments(arguments: argparse.Namespace, conf: Path) -> None:
     """
     rerun = arguments.experimental_rerun
     require(rerun is None, "--experimental-rerun", "be left out, since it would unpickle a file", rerun)
-    for override in OverridesParser.create().parse_overrides(arguments.overrides):
+    for override in _parsed(arguments.overrides):
         name = override.key_or_group
         options, got = _options(name, conf), str(override.input_line).partition("=")[2]
         if override.is_sweep_override():
             _refuse_empty_sweep(override, options, got)
         elif options and not override.is_delete():
             require(isinstance(override.value(), str), name, f"be one of {', '.join(options)}", got)
+
+
+def _parsed(overrides: list[str]) -> list[Override]:
+    try:
+        return OverridesParser.create().parse_overrides(overrides)
+    except RecursionError as error:
+        raise InputError("The arguments must be nested less deeply, got more brackets than can be read.") from error
 
 
 def _options(group: str, conf: Path) -> list[str]:

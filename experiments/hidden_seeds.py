@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import os
 import re
 import secrets
 import sys
@@ -19,6 +20,7 @@ from pathlib import Path
 
 from deskew.errors import DeskewError, InputError, require
 from deskew.io import write_bytes
+from deskew.io.files import read_bytes, shown
 
 N_OPEN = 1000
 """Seeds below are open: whoever develops a method may use them."""
@@ -62,8 +64,11 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _draw(path: Path, count: str) -> int:
-    require(count.isascii() and count.isdigit(), "COUNT", f"be a whole number in [1, {_N_MOST}]", count)
-    require(not path.exists(), str(path), "not be there: seeds that were committed to are not drawn again", "a file")
+    whole = count.isascii() and count.isdigit() and len(count) <= len(str(_N_MOST))
+    require(whole, "COUNT", f"be a whole number in [1, {_N_MOST}]", shown(count))
+    require(
+        not os.path.lexists(path), str(path), "not be there: seeds that were committed to are not drawn again", "a file"
+    )
     content = drawn(int(count)).encode()
     write_bytes(content, path)
     print(digest(content))
@@ -72,8 +77,7 @@ def _draw(path: Path, count: str) -> int:
 
 def _check(path: Path, published: str) -> int:
     require(re.fullmatch(r"[0-9a-f]{64}", published) is not None, "SHA256", "be 64 hexadecimal digits", published)
-    require(path.is_file(), str(path), "be a file", "none")
-    agrees = hmac.compare_digest(digest(path.read_bytes()), published)
+    agrees = hmac.compare_digest(digest(read_bytes(path)), published)
     print("They agree." if agrees else f"`{path}` is not the file that was committed to.")
     return int(not agrees)
 

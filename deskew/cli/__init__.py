@@ -9,6 +9,7 @@ The stages are imported inside the commands: --help and wrong options answer at 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
 import typer
@@ -40,6 +41,15 @@ for _command in (
 app.command("import")(importing.import_captures)
 
 
+def _value_of(error: typer.TyperException, given: Sequence[str]) -> str:
+    """Say what was given for the option at fault, which Typer's own message does not always."""
+    parameter = getattr(error, "param", None)
+    named = next((i for i, word in enumerate(given) if word in getattr(parameter, "opts", ())), None)
+    if parameter is None or named is None:
+        return ""
+    return f", got {' '.join(given[named + 1 : named + 1 + parameter.nargs])}"
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code.
 
@@ -53,11 +63,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     int
         0 done, 2 wrong input or usage, 3 a step failed, 130 interrupted.
     """
+    given = sys.argv[1:] if argv is None else list(argv)
     try:
         # Typer's own handling would print usage, a hint and the error: three lines and no house wording.
-        return int(app(args=None if argv is None else list(argv), prog_name="deskew", standalone_mode=False) or 0)
+        return int(app(args=given, prog_name="deskew", standalone_mode=False) or 0)
     except typer.TyperException as error:
-        say(f"{error.format_message()} (deskew --help shows what is allowed)")
+        say(f"{error.format_message()}{_value_of(error, given)} (deskew --help shows what is allowed)")
         return 2
     except DeskewError as error:
         say(str(error))

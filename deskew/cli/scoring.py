@@ -74,10 +74,10 @@ def score(flat_file: FlatFile, truth_file: TruthFile, as_json: Json = False) -> 
 
     by_texture = flat_file.suffix.lower() == ".obj" and flat.texture is not None and not _carried_along(flat, truth)
     places: Floats = flat.texture if by_texture and flat.texture is not None else flat.vertices[:, :2]
-    if not by_texture and flat.vertices[:, 2].any():
-        say(f"warning: {flat_file.name} is not flat on z = 0; only its x and y are scored")
     assert truth.texture is not None
     figures = metrics.score_flattening(truth.sheet, truth.texture, places, same_axes=by_texture)
+    if not by_texture and flat.vertices[:, 2].any():
+        say(f"warning: {flat_file.name} is not flat on z = 0; only its x and y are scored")
     head = {"flat": str(flat_file), "truth": str(truth_file), "places": "texture" if by_texture else "xy"}
     report({**head, "vertices": n, "faces": len(truth.faces), **figures}, as_json)
 

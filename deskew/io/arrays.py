@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import io
 import math
+import tokenize
+import warnings
 import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 
 from deskew.errors import InputError, require
-from deskew.io.files import read_bytes, shown, write_bytes
+from deskew.io.files import require_file, shown, write_bytes
 from deskew.types import Array
 
-MAX_ARRAY_BYTES = 1 << 30
-"""Largest sum of arrays that a file may unpack to."""
+MAX_ARRAY_BYTES = 3 << 28
+"""Largest file, and largest sum of arrays that it may unpack to: what is wrong is said within 1 GB of memory."""
+
+# numpy parses a header as a literal of Python's, and on failure once more as one of Python 2's.
+_NO_HEADER = (ValueError, SyntaxError, tokenize.TokenError, TypeError, KeyError, MemoryError, RecursionError)
+_DAMAGE = (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
 def write_arrays(arrays: Mapping[str, Array], path: Path) -> None:
@@ -38,11 +45,19 @@ def write_arrays(arrays: Mapping[str, Array], path: Path) -> None:
     write_bytes(stream.getvalue(), path)
 
 
-def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, name: str) -> Array:
-    with archive.open(entry) as stream:
+def _header(stream: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    try:
         version = np.lib.format.read_magic(stream)
         reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
         shape, _, dtype = reader(stream)
+    except _NO_HEADER as error:
+        raise InputError(f"`{name}` must begin with the header of an array, got damage.") from error
+    return shape, dtype
+
+
+def _array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, name: str) -> Array:
+    with archive.open(entry) as stream:
+        shape, dtype = _header(stream, name)
         n_bytes = math.prod(shape) * dtype.itemsize
         require(dtype.kind in "fiub", name, "hold numbers", shown(dtype.str))
         # The header alone decides how much memory numpy asks for: it has to agree with what is really there.
@@ -61,9 +76,13 @@ def read_arrays(path: Path) -> dict[str, Array]:
         If it is missing, damaged, holds anything but plain numbers, or unpacks to more than `MAX_ARRAY_BYTES`.
     """
     path = Path(path)
-    data = read_bytes(path)
+    require_file(path)
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        size = path.stat().st_size
+        require(size <= MAX_ARRAY_BYTES, str(path), f"have at most {MAX_ARRAY_BYTES} bytes", size)
+        # What numpy has to say of a header is nothing to the user: the file is read, or refused in one line.
+        with warnings.catch_warnings(), zipfile.ZipFile(path) as archive:
+            warnings.simplefilter("ignore")
             entries = archive.infolist()
             total = sum(entry.file_size for entry in entries)
             allowed = f"unpack to at most {MAX_ARRAY_BYTES} bytes"
@@ -73,7 +92,7 @@ def read_arrays(path: Path) -> dict[str, Array]:
             return {n: _array(archive, e, f"{path}: {shown(n)}") for n, e in zip(names, entries, strict=True)}
     except InputError:
         raise
-    except (ValueError, OSError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
+    except _DAMAGE as error:
         raise InputError(f"`{path}` must be a whole NPZ file of plain numbers, got {shown(str(error))}.") from error
 
 

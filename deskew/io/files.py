@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import reprlib
@@ -18,8 +19,11 @@ from deskew.errors import InputError, StepError, require
 MAX_TEXT_BYTES = 1 << 20
 """Largest TOML or JSON file that is parsed: a thousand times what the project writes."""
 
-MAX_FILE_BYTES = 1 << 30
-"""Largest image, mesh or array file that is opened."""
+MAX_FILE_BYTES = 1 << 29
+"""Largest image or mesh file that is opened: what is wrong with it is then said within 1 GB of memory."""
+
+MAX_NAME_BYTES = 255
+"""Longest name that common file systems take."""
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
@@ -69,7 +73,7 @@ def read_bytes(path: Path, limit: int = MAX_FILE_BYTES) -> bytes:
     try:
         size = path.stat().st_size
         require(size <= limit, str(path), f"have at most {limit} bytes", size)
-        return path.read_bytes()
+        return read_head(path, size)  # no more: some of the kernel's files say 0 bytes and never end
     except OSError as error:
         raise InputError(f"`{path}` must be readable, got {error.strerror or error}.") from error
 
@@ -85,12 +89,13 @@ def read_head(path: Path, n_bytes: int) -> bytes:
 
 
 def _parse(path: Path, kind: str, parser: Callable[[str], Any]) -> dict[str, Any]:
+    text = read_bytes(path, MAX_TEXT_BYTES)
+    require(not text.startswith(codecs.BOM_UTF8), str(path), f"be {kind} without a byte order mark", "one")
     try:
-        values = parser(read_bytes(path, MAX_TEXT_BYTES).decode("utf-8"))
-    except InputError:
-        raise
+        values = parser(text.decode("utf-8"))
     except (ValueError, RecursionError) as error:  # ValueError covers both parsers, bad UTF-8 and endless digits
         reason = "nesting too deep" if isinstance(error, RecursionError) else str(error)
+        reason = "a number of thousands of digits" if "int_max_str_digits" in reason else reason
         raise InputError(f"`{path}` must be valid {kind}, got {shown(reason)}.") from error
     require(isinstance(values, dict), str(path), f"hold a {kind} object", shown(values))
     return dict(values)
@@ -126,6 +131,8 @@ def require_writable(path: Path, suffixes: tuple[str, ...]) -> None:
 
 def _require_parent(path: Path) -> None:
     require("\0" not in str(path), shown(str(path)), "be a file name", "a null byte in it")
+    n_bytes = len(os.fsencode(path.name))
+    require(n_bytes <= MAX_NAME_BYTES, shown(str(path)), f"be a name of at most {MAX_NAME_BYTES} bytes", n_bytes)
     require(_kind(path.parent) == "a folder", str(path), "lie in an existing folder", f"no folder {path.parent}")
 
 
@@ -182,6 +189,8 @@ def replacing_folder(folder: Path) -> Iterator[Path]:
             (scratch / "whole").mkdir()
             yield scratch / "whole"
             (scratch / "whole").replace(folder)
+        except StepError as error:  # of a file within: the scratch folder is nothing to the user
+            raise StepError(str(error).replace(str(scratch / "whole"), str(folder))) from error
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
 

@@ -16,8 +16,14 @@ from deskew.types import Array, Size
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff")
 
-MAX_DECODED_BYTES = 1 << 29
-"""Largest picture that is decoded: 178 megapixels of 8-bit colour."""
+MAX_DECODED_BYTES = 3 << 27
+"""Largest picture that is decoded, 134 megapixels of 8-bit colour: what is wrong is said within 1 GB of memory."""
+
+_PACKED_MAX = (
+    1 << 13
+)  # decoded over stored bytes; LZW and Deflate reach some 1400, and a decoded grey counts four times
+
+_ROWS = 64
 
 
 def _header(data: bytes, path: Path) -> tiff.Header:
@@ -27,6 +33,13 @@ def _header(data: bytes, path: Path) -> tiff.Header:
     size = f"{found.size[0]}x{found.size[1]} px"
     require(small, str(path), f"decode to at most {MAX_DECODED_BYTES} bytes", f"{size}, {found.decoded_bytes} bytes")
     return found
+
+
+def _require_pixels(found: tiff.Header, data: bytes, path: Path) -> None:
+    """Refuse a TIFF too short for what it declares: its decoder would leave the rest black, and say nothing."""
+    room = found.decoded_bytes <= _PACKED_MAX * len(data)
+    size = f"{found.size[0]}x{found.size[1]} px"
+    require(room, str(path), f"hold the {size} that it declares", f"{len(data)} bytes")
 
 
 def _decode(data: bytes, path: Path) -> Array:
@@ -79,17 +92,20 @@ def read_raster(path: Path, size: Size | None = None) -> Array:
     suffix = path.suffix.lower()
     require(suffix in IMAGE_SUFFIXES, str(path), f"end in {' or '.join(IMAGE_SUFFIXES)}", suffix or "no suffix")
     data = read_bytes(path)
-    declared = _header(data, path).size
+    header = _header(data, path)
+    if suffix != ".png":
+        _require_pixels(header, data, path)
+    declared = header.size
     if size is not None:
         require(declared == size, str(path), f"be {size[0]}x{size[1]} px", f"{declared[0]}x{declared[1]} px")
     image = _decode(data, path)
     found = (image.shape[1], image.shape[0])
     require(found == declared, str(path), f"decode to {declared} px as its header says", f"{found} px")
-    if image.ndim == 3 and image.shape[2] == 4:
-        image = cv2.cvtColor(image, cv2.COLOR_BGRA2RGBA)
-    elif image.ndim == 3 and image.shape[2] == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
-    return np.asarray(image)
+    if image.ndim == 3 and image.shape[2] in (3, 4):
+        # In place, since a large picture need not be held twice, and by numpy, which knows every sample type.
+        for rows in range(0, len(image), _ROWS):
+            image[rows : rows + _ROWS, :, :3] = image[rows : rows + _ROWS, :, 2::-1].copy()
+    return image
 
 
 def read_image(path: Path, size: Size | None = None) -> Array:
@@ -110,8 +126,8 @@ def read_image(path: Path, size: Size | None = None) -> Array:
     image = read_raster(path, size)
     require(image.dtype in (np.uint8, np.uint16), str(path), "have 8 or 16 bits a sample", image.dtype)
     if image.ndim == 3 and image.shape[2] == 4:
-        opaque = bool((image[..., 3] == np.iinfo(image.dtype).max).all())
-        require(opaque, str(path), "be without transparency", f"an alpha down to {image[..., 3].min()}")
+        least = int(image[..., 3].min())
+        require(least == np.iinfo(image.dtype).max, str(path), "be without transparency", f"an alpha down to {least}")
         image = np.ascontiguousarray(image[..., :3])
     grey_or_colour = image.ndim == 2 or image.shape[2] == 3
     require(grey_or_colour, str(path), "have 1 or 3 channels", image.shape[2:])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,17 +88,28 @@ def sheet_mesh(sheet: Sheet, texture: Floats | None = None) -> Mesh:
     return Mesh(sheet.vertices.reshape(-1, 3), faces, flat)
 
 
+def _obj(data: bytes) -> Mesh:
+    # Line by line: all of them at once would take many times the memory of the file.
+    with io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig") as text:
+        return Mesh(*obj.parsed(iter(lambda: text.readline(obj.MAX_LINE + 1), "")))
+
+
 def _ply(data: bytes) -> Mesh:
     import trimesh  # here, since it takes longer to import than most commands that need no mesh take to run
 
     require(data.startswith(b"ply"), "mesh", "begin with the word ply", shown(data[:8]))
     header = data.partition(b"end_header")[0]
+    require(len(header) < len(data), "mesh", "have a whole PLY header", "no end_header")
+    known = re.search(rb"^format\s+(ascii|binary_little_endian|binary_big_endian)\s", header, re.MULTILINE)
+    require(known is not None, "format", "be ascii, binary_little_endian or binary_big_endian", "another or none")
     properties = set(re.findall(rb"^property\s+\w+\s+(\w+)\s*$", header, re.MULTILINE))
     require(properties >= {b"x", b"y", b"z"}, "vertices", "have the properties x, y and z", "others")
     # fix_texture would split vertices at seams; no resolver is given, so that no file named inside is opened.
-    loaded: Any = trimesh.load(
-        io.BytesIO(data), file_type="ply", process=False, fix_texture=False, skip_materials=True, force="mesh"
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of numbers beyond all measure, which are refused below in one line
+        loaded: Any = trimesh.load(
+            io.BytesIO(data), file_type="ply", process=False, fix_texture=False, skip_materials=True, force="mesh"
+        )
     uv = getattr(loaded.visual, "uv", None)
     texture = None if uv is None else np.array(uv, dtype=np.float64)
     vertices, faces = np.array(loaded.vertices), np.array(loaded.faces, dtype=np.int64).reshape(-1, 3)
@@ -138,7 +150,7 @@ def read_mesh(path: Path) -> Mesh:
     require(suffix in MESH_SUFFIXES, str(path), f"end in {' or '.join(MESH_SUFFIXES)}", suffix or "no suffix")
     data = read_bytes(path)
     try:
-        return Mesh(*obj.parsed(data.decode("utf-8-sig"))) if suffix == ".obj" else _ply(data)
+        return _obj(data) if suffix == ".obj" else _ply(data)
     except InputError as error:
         raise InputError(f"`{path}`: {error}") from error
     except Exception as error:  # a damaged file surfaces in trimesh as any of a dozen types, none of them its own

@@ -6,6 +6,7 @@ mesh by another program stands or falls with that order. So OBJ is read and writ
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable
 
 import numpy as np
@@ -17,16 +18,22 @@ from deskew.types import Array, Floats
 
 Faces = npt.NDArray[np.int64]
 
+MAX_LINE = 1 << 20
+"""Longest line that is read: a face of a hundred thousand corners."""
+
+_NONE = -1  # no texture coordinate yet
+
 
 def _index(word: str, n: int) -> int:
+    require(len(word) <= 20, "index", f"be in [1, {n}]", shown(word))  # before it is made a number
     index = int(word)
     index = index - 1 if index > 0 else n + index  # OBJ counts from 1, or backwards from the end
     require(0 <= index < n, "index", f"be in [1, {n}]", word)
     return index
 
 
-def parsed(text: str) -> tuple[Floats, Faces, Floats | None]:
-    """Read OBJ text; faces of more corners are cut into triangles.
+def parsed(lines: Iterable[str]) -> tuple[Floats, Faces, Floats | None]:
+    """Read the lines of an OBJ; faces of more corners are cut into triangles.
 
     Returns
     -------
@@ -44,40 +51,52 @@ def parsed(text: str) -> tuple[Floats, Faces, Floats | None]:
     ValueError
         If a word is no number.
     """
-    vertices: list[list[float]] = []
-    textures: list[list[float]] = []
-    faces: list[tuple[int, int, int]] = []
-    texture_of: dict[int, int] = {}
-    for line in text.splitlines():
+    # Packed numbers: a hundred million bytes of text would be gigabytes as lists.
+    vertices, textures, faces = array("d"), array("d"), array("q")
+    texture_of = array("q")
+    for line in lines:
+        require(len(line) <= MAX_LINE, "a line", f"have at most {MAX_LINE} characters", "more")
         keyword, *words = line.split() or [""]
         if keyword == "v":
-            require(len(words) >= 3, "a line `v`", "hold 3 numbers", shown(line))
-            vertices.append([float(word) for word in words[:3]])
+            require(len(words) >= 3, "a line `v`", "hold 3 numbers", shown(line.rstrip()))
+            vertices.extend(map(float, words[:3]))
+            texture_of.append(_NONE)
         elif keyword == "vt":
-            require(len(words) >= 2, "a line `vt`", "hold 2 numbers", shown(line))
-            textures.append([float(word) for word in words[:2]])
+            require(len(words) >= 2, "a line `vt`", "hold 2 numbers", shown(line.rstrip()))
+            textures.extend(map(float, words[:2]))
         elif keyword == "f":
             corners = [word.split("/") for word in words]
-            require(len(corners) >= 3, "a line `f`", "name 3 or more vertices", shown(line))
-            at = [_index(corner[0], len(vertices)) for corner in corners]
-            faces += [(at[0], at[i], at[i + 1]) for i in range(1, len(at) - 1)]
+            require(len(corners) >= 3, "a line `f`", "name 3 or more vertices", shown(line.rstrip()))
+            at = [_index(corner[0], len(texture_of)) for corner in corners]
+            for i in range(1, len(at) - 1):
+                faces.extend((at[0], at[i], at[i + 1]))
             for vertex, corner in zip(at, corners, strict=True):
                 if len(corner) > 1 and corner[1]:
-                    used = texture_of.setdefault(vertex, _index(corner[1], len(textures)))
-                    same = textures[used] == textures[_index(corner[1], len(textures))]
-                    require(same, f"vertex {vertex + 1}", "have one texture coordinate (no seam)", "two")
+                    _name_texture(texture_of, vertex, _index(corner[1], len(textures) // 2), textures)
     require(len(faces) > 0, "mesh", "have faces", "none")
-    return np.array(vertices), np.array(faces, dtype=np.int64), _texture(len(vertices), textures, texture_of)
+    places, flat = np.array(vertices).reshape(-1, 3), np.array(textures).reshape(-1, 2)
+    return places, np.array(faces, dtype=np.int64).reshape(-1, 3), _texture(flat, np.array(texture_of))
 
 
-def _texture(n_vertices: int, textures: list[list[float]], texture_of: dict[int, int]) -> Floats | None:
+def _name_texture(texture_of: array[int], vertex: int, named: int, textures: array[float]) -> None:
+    """Give a vertex its texture coordinate; it may have the same one twice, and no other."""
+    used = texture_of[vertex]
+    if used == _NONE:
+        texture_of[vertex] = used = named
+    same = used == named or textures[2 * used : 2 * used + 2] == textures[2 * named : 2 * named + 2]
+    require(same, f"vertex {vertex + 1}", "have one texture coordinate (no seam)", "two")
+
+
+def _texture(textures: Floats, texture_of: npt.NDArray[np.int64]) -> Floats | None:
     """One coordinate a vertex; where the two lists run side by side, also of those that no face uses."""
-    if not texture_of:
+    named = texture_of != _NONE
+    if not named.any():
         return None
-    if len(textures) == n_vertices and all(vertex == used for vertex, used in texture_of.items()):
-        return np.array(textures)
-    require(len(texture_of) == n_vertices, "every vertex", "have a texture coordinate", f"{len(texture_of)}")
-    return np.array([textures[texture_of[i]] for i in range(n_vertices)])
+    n_vertices, used = len(texture_of), np.flatnonzero(named)
+    if len(textures) == n_vertices and np.array_equal(texture_of[used], used):
+        return textures
+    require(bool(named.all()), "every vertex", "have a texture coordinate", f"{int(named.sum())}")
+    return textures[texture_of]
 
 
 def _lines(keyword: str, rows: Array) -> Iterable[str]:

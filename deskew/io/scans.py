@@ -32,6 +32,7 @@ _SCAN: dict[str, tuple[int | None, ...]] = {
     "outline": (4, 2),
     "filled_fraction": (),
 }
+_OPTIONAL: dict[str, tuple[int | None, ...]] = {"sheet_crease_width": ()}
 
 
 def _pinhole_arrays(device: Pinhole, prefix: str) -> dict[str, Array]:
@@ -184,7 +185,8 @@ def read_scan(path: Path) -> Scan:
     path = Path(path)
     arrays = read_arrays(path)
     colour = arrays.get("image_white", np.empty((0, 0))).ndim == 3
-    require_arrays(arrays, {**_SCAN, "image_white": (None, None, 3) if colour else (None, None)}, path)
+    further = {name: shape for name, shape in _OPTIONAL.items() if name in arrays}
+    require_arrays(arrays, {**_SCAN, **further, "image_white": (None, None, 3) if colour else (None, None)}, path)
     try:
         images = {name.removeprefix("image_"): v for name, v in arrays.items() if name.startswith("image_")}
         for light, image in images.items():

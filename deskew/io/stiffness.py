@@ -27,7 +27,7 @@ from deskew.types import Array, Floats
 MAX_STIFFNESS = 1e9
 """Largest spring constant that is taken for one [kg/s^2]; the paper's sheets have 30."""
 
-_COLOURS = {0: "grey", 2: "RGB", 3: "a palette", 4: "grey with alpha", 6: "RGB with alpha"}
+_COLOURS = {0: "grey", 2: "RGB", 3: "palette", 4: "grey with alpha", 6: "RGB with alpha"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +94,8 @@ def _constants(path: Path) -> dict[int, float]:
     require(only, str(path), "hold one table [stiffness]", shown(sorted(tables)))
     constants = {}
     for key, value in dict(table or {}).items():
-        plain = key.isascii() and key.isdigit() and str(int(key)) == key and int(key) < 1 << 16
+        # Short before it is a number: Python refuses to make one of thousands of digits.
+        plain = len(key) <= 5 and key.isascii() and key.isdigit() and str(int(key)) == key and int(key) < 1 << 16
         require(plain, f"{path}: {shown(key)}", "be a label in [0, 65535]", shown(key))
         require_positive(f"{path}: {key}", value, MAX_STIFFNESS, "kg/s^2")
         constants[int(key)] = float(value)

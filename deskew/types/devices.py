@@ -41,7 +41,9 @@ class Pinhole:
             require_finite(name, values, shape)
         focal = (float(self.K[0, 0]), float(self.K[1, 1]))
         require(min(focal) > 0, "K", "have positive focal lengths", focal)
-        require(bool(np.allclose(self.R @ self.R.T, np.eye(3), atol=1e-6)), "R", "be a rotation", self.R.tolist())
+        # No entry of a rotation is beyond 1, and the product of larger ones might overflow.
+        orthonormal = bool((np.abs(self.R) < 2).all()) and np.allclose(self.R @ self.R.T, np.eye(3), atol=1e-6)
+        require(orthonormal, "R", "be a rotation", self.R.tolist())
         require(float(np.linalg.det(self.R)) > 0, "R", "be a rotation, not a reflection", "determinant -1")
 
 

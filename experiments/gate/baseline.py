@@ -14,11 +14,13 @@ import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from deskew.errors import InputError, require
 from deskew.io import write_bytes
+from deskew.io.files import read_bytes
 from experiments.gate.floors import Figure, Noise, floors_text, read_floors
 from experiments.reporting.export import csv_text
 from experiments.trials import Row
@@ -89,13 +91,12 @@ def read_rows(path: Path) -> list[Row]:
     """
     columns = [item.name for item in fields(Row)]
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.reader(file)
-            heading = next(reader, [])
-            if heading != columns:
-                raise ValueError(f"the columns {','.join(heading)[:100] or '(none)'}")
-            rows = sorted(_row(cells) for cells in reader)
-    except (OSError, ValueError, csv.Error) as error:
+        reader = csv.reader(StringIO(read_bytes(path).decode("utf-8"), newline=""))
+        heading = next(reader, [])
+        if heading != columns:
+            raise ValueError(f"the columns {','.join(heading)[:100] or '(none)'}")
+        rows = sorted(_row(cells) for cells in reader)
+    except (ValueError, csv.Error) as error:
         reason = " ".join(str(error).split())
         raise InputError(
             f"`{path}` must be a results.csv with the columns {','.join(columns)}, got: {reason}."
@@ -120,8 +121,8 @@ def _row(cells: Sequence[str]) -> Row:
 
 def _read_about(path: Path) -> dict[str, Any]:
     try:
-        about = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        about = json.loads(read_bytes(path))
+    except (ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"`{path}` must say what produced the baseline, got: {reason}.") from error
     version = about.get("version") if isinstance(about, dict) else None

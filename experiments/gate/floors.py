@@ -21,6 +21,7 @@ from typing import NamedTuple
 from scipy import stats
 
 from deskew.errors import InputError, require
+from deskew.io.files import read_bytes
 from deskew.types import Floats
 from experiments.trials import unit_of
 
@@ -120,9 +121,8 @@ def read_floors(path: Path) -> dict[Figure, Noise]:
         If the file is none.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return dict(_parsed(csv.DictReader(file)))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        return dict(_parsed(csv.DictReader(StringIO(read_bytes(path).decode("utf-8"), newline=""))))
+    except (ValueError, KeyError, TypeError, csv.Error) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"`{path}` must hold the floors of a baseline, got: {reason}.") from error
 

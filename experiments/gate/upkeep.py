@@ -6,6 +6,7 @@ import csv
 import gzip
 import json
 import shlex
+import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -16,6 +17,7 @@ import numpy as np
 
 from deskew.errors import InputError, require
 from deskew.io import write_bytes
+from deskew.io.files import require_file
 from experiments.gate.baseline import Baseline, Place, place_of, read_baseline, write_baseline
 from experiments.gate.directions import direction_of
 from experiments.gate.floors import Figure, Noise, noise_of
@@ -92,6 +94,7 @@ def read_table(path: Path) -> dict[int, dict[Place, float]]:
         If the file is no such table.
     """
     try:
+        require_file(path)
         with gzip.open(path, "rt", encoding="utf-8", newline="") as file:
             heading, *lines = csv.reader(file)
         if tuple(heading[: len(_KEY)]) != _KEY:
@@ -102,7 +105,7 @@ def read_table(path: Path) -> dict[int, dict[Place, float]]:
             for column, value in zip(found.values(), values, strict=True):
                 if value:
                     column[place] = float(value)
-    except (OSError, EOFError, ValueError) as error:
+    except (OSError, EOFError, ValueError, csv.Error, zlib.error) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"`{path}` must be a table of redraws, got: {reason}.") from error
     return found

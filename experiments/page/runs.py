@@ -9,10 +9,12 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import date
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from deskew.errors import DeskewError, InputError, require
+from deskew.io.files import read_bytes
 from experiments.reporting import Layout
 from experiments.reporting.blocks import Block
 from experiments.reporting.tables import table_blocks
@@ -93,10 +95,12 @@ def read_runs(reports: Path) -> list[Run]:
 
 def _read(folder: Path) -> Run:
     try:
-        about = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        about = json.loads(read_bytes(folder / "run.json"))
         require(about["experiment"] in STUDIES, f"{folder}: experiment", "be one of the studies", about["experiment"])
         rows = _rows(folder / "results.csv")
         require(bool(rows), str(folder / "results.csv"), "hold a row", "none")
+        seeded = "commit" in about and "seed" in about["config"]
+        require(seeded, str(folder / "run.json"), "say the commit and the seed of its run", "others alone")
         return Run(
             folder.name,
             about,
@@ -108,27 +112,26 @@ def _read(folder: Path) -> Run:
         )
     except DeskewError:
         raise
-    except (OSError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError, csv.Error) as error:
         raise InputError(f"`{folder}` must hold a run's own results.csv and run.json, got {error!r}.") from error
 
 
 def _rows(path: Path) -> list[Row]:
-    with path.open(newline="", encoding="utf-8") as file:
-        lines = csv.DictReader(file)
-        require(lines.fieldnames == _COLUMNS, str(path), f"have the columns {','.join(_COLUMNS)}", lines.fieldnames)
-        return [
-            Row(
-                line["experiment"],
-                line["condition"],
-                line["method"],
-                int(line["trial"]),
-                int(line["seed"]),
-                line["metric"],
-                float(line["value"]),
-                line["unit"],
-            )
-            for line in lines
-        ]
+    lines = csv.DictReader(StringIO(read_bytes(path).decode("utf-8"), newline=""))
+    require(lines.fieldnames == _COLUMNS, str(path), f"have the columns {','.join(_COLUMNS)}", lines.fieldnames)
+    return [
+        Row(
+            line["experiment"],
+            line["condition"],
+            line["method"],
+            int(line["trial"]),
+            int(line["seed"]),
+            line["metric"],
+            float(line["value"]),
+            line["unit"],
+        )
+        for line in lines
+    ]
 
 
 def _day_in_history(commit: str) -> str:

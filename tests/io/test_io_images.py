@@ -180,7 +180,7 @@ def test_a_decompression_bomb_is_refused_before_it_costs_memory(tmp_path: Path, 
     path = tmp_path / f"bomb{suffix}"
     path.write_bytes(content)
     tracemalloc.start()
-    with pytest.raises(InputError, match=r"bomb\.\w+` must decode to at most 536870912 bytes, got \d+x\d+ px"):
+    with pytest.raises(InputError, match=r"bomb\.\w+` must decode to at most 402653184 bytes, got \d+x\d+ px"):
         read_image(path)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()

@@ -90,7 +90,7 @@ WRONG_TABLES = {
 }  # fmt: skip
 WRONG_PICTURES = {
     "RGB": (png(2, 8, bytes(12)), "8-bit RGB"),
-    "a palette": (png(3, 8, bytes(4), (b"PLTE", bytes(3))), "8-bit a palette"),
+    "a palette": (png(3, 8, bytes(4), (b"PLTE", bytes(3))), "8-bit palette"),
     "grey with alpha": (png(4, 8, b"\0\xff" * 4), "8-bit grey with alpha"),
     "four bits": (png(0, 4, b"\x01\x23"), "4-bit grey"),
     "one bit": (png(0, 1, b"\xa0"), "1-bit grey"),

@@ -11,6 +11,7 @@ from math import exp, log, nan
 from pathlib import Path
 from typing import Any, Protocol
 
+from deskew.errors import InputError, in_one_line, require
 from experiments.reporting.claims.rules import Figure
 from experiments.reporting.statistics import share_interval, summarise
 from experiments.trials.record import FAILED
@@ -53,15 +54,19 @@ class Evidence:
 
     def n_trials(self, report: str) -> int:
         """Return how many trials a report was asked for: one more than the last that is in it."""
-        return 1 + max(trial for values in self._table(report, "results").values() for trial in values)
+        return 1 + max((trial for values in self._table(report, "results").values() for trial in values), default=-1)
 
     def run(self, report: str) -> dict[str, Any]:
         """Return a report's `run.json`."""
         path = self.folder / report / "run.json"
         if not path.is_file():
             raise MissingError(report)
-        found: dict[str, Any] = json.loads(path.read_text())
-        return found
+        try:
+            found = json.loads(path.read_bytes())
+        except (OSError, ValueError, RecursionError) as error:
+            raise InputError(f"`{path}` must be JSON, got {in_one_line(error)}.") from error
+        require(isinstance(found, dict), str(path), "hold a JSON object", type(found).__name__)
+        return dict(found)
 
     def _table(self, report: str, kind: str) -> Mapping[tuple[str, str, str], Trials]:
         if (report, kind) not in self._tables:
@@ -74,9 +79,14 @@ class Evidence:
 
 def _read(path: Path) -> Mapping[tuple[str, str, str], Trials]:
     table: dict[tuple[str, str, str], dict[int, float]] = defaultdict(dict)
-    with path.open(newline="") as file:
-        for row in csv.DictReader(file):
-            table[row["condition"], row["method"], row["metric"]][int(row["trial"])] = float(row["value"])
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                if None in row.values():
+                    raise ValueError("a line cut short")
+                table[row["condition"], row["method"], row["metric"]][int(row["trial"])] = float(row["value"])
+    except (OSError, ValueError, KeyError, csv.Error) as error:
+        raise InputError(f"`{path}` must be a results.csv or timings.csv, got {in_one_line(error)}.") from error
     return table
 
 

@@ -25,6 +25,7 @@ from submitit.core.utils import FailedJobError
 from deskew.errors import InputError, StepError, in_one_line, require
 from deskew.io import write_bytes
 from experiments.trials.engines.engine import WORKERS_A_TRIAL, Finished, Prepare, Run
+from experiments.trials.engines.handed import handed_over, taken_over
 from experiments.trials.record import carry_out, failed_outcome
 from experiments.trials.schema import TrialKey
 from experiments.trials.threads import ONE_THREAD, environment, n_cores, one_thread
@@ -122,7 +123,7 @@ class Slurm:
         names = self._names()
         for key in list(waiting):
             if _name(key) in names:
-                yield key, pickle.loads((self.folder / _name(key)).read_bytes())
+                yield key, taken_over(self.folder / _name(key))
 
     def _names(self) -> set[str]:
         return {path.name for path in self.folder.glob("*.outcome")}
@@ -187,7 +188,7 @@ def _carry_out_all(folder: Path, keys: Sequence[TrialKey]) -> None:
         for key in keys:
             # A job of an interrupted run may still be at work here.
             if not (folder / _name(key)).exists():
-                write_bytes(pickle.dumps(carry_out(partial(run, shared), key)), folder / _name(key))
+                write_bytes(handed_over(carry_out(partial(run, shared), key)), folder / _name(key))
 
 
 def _require_slurm() -> None:
