@@ -91,7 +91,6 @@ class Surfaces(Study):
             is_file = os.path.isfile(path)  # noqa: PTH113  # answers for names that pathlib raises on
             require(is_file, "surfaces.paths", "name files", f"{path}, where there is none")
             require(path.stem.isprintable(), "surfaces.paths", "name files by printable characters", repr(path.stem))
-            _given(path)
         if paths:
             return [
                 TrialKey(config.experiment, f"flattened/{p.stem}", "-", i, config.seed) for i, p in enumerate(paths)
@@ -127,18 +126,13 @@ class Surfaces(Study):
 def _mesh(config: Config, key: TrialKey, rng: np.random.Generator) -> tuple[Mesh, dict[str, float]]:
     """Read the trial's file or generate its kind; say how bent it is, of a file how high alone."""
     if config.surfaces.paths:
-        mesh = _given(Path(config.surfaces.paths[key.trial]))
+        path = Path(config.surfaces.paths[key.trial])
+        mesh = read_mesh(path)
+        require(mesh.texture is not None, str(path), "hold texture coordinates, the flat places [mm]", "none")
         return mesh, {"relief_mm": float(np.ptp(mesh.vertices[:, 2]))}
     kind = key.condition.partition("/")[2]
     sheet = surfaces.generate(kind, int(rng.integers(1 << 62)))
     return sheet_mesh(Sheet(sheet.vertices), sheet.flat), severity(sheet)
-
-
-def _given(path: Path) -> Mesh:
-    """Read a mesh that stores its flat sheet; one that does not is refused before any trial."""
-    mesh = read_mesh(path)
-    require(mesh.texture is not None, str(path), "hold texture coordinates, the flat places [mm]", "none")
-    return mesh
 
 
 def _flattened(sheet: Sheet, method: str | OwnMethod) -> Flattened:

@@ -10,7 +10,6 @@ import numpy as np
 from deskew.types import Array
 from tests.badinput.case import Break, Case, edited, written
 from tests.badinput.forged import npz_that_declares
-from tests.badinput.meshes import SQUARE
 from tests.badinput.places import pipe
 from tests.badinput.samples import TABLE, sheet_arrays
 
@@ -73,12 +72,6 @@ CONFIGURATIONS = (
     ),
     config("a given mesh that is not there", "surfaces.paths=[no.obj]", "surfaces.paths", "no.obj"),
     config("a mesh in another format", "surfaces.paths=[c.json]", "`surfaces.paths`", "OBJ or PLY"),
-    Case(
-        "a mesh that is damaged",
-        f"{SURFACES} surfaces.paths=[a.obj]",
-        ("a.obj", "finite"),
-        written("a.obj", SQUARE + "v nan 0 0\nf 1 2 3\n"),
-    ),
     Case(
         "a mesh that is a pipe for an experiment",
         f"{SURFACES} surfaces.paths=[a.obj]",

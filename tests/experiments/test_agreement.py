@@ -62,9 +62,9 @@ TWICE = csv_text([Row("fake", "control", "-", 0, 1, "misses", 1.0, "1")] * 2)
 @pytest.mark.parametrize("content", ["", "these are my notes\n", "experiment,value\nfake,1\n", TWICE])
 def test_what_is_no_table_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], content: str) -> None:
     (tmp_path / "notes.csv").write_text(content)
-    for other in ("notes.csv", "absent.csv"):
+    for other, wanted in (("notes.csv", "be a results.csv"), ("absent.csv", "be a file, got nothing there")):
         assert main([str(written(tmp_path / "a.csv")), str(tmp_path / other)]) == 2
-        assert f"{other}` must be a results.csv" in capsys.readouterr().err
+        assert f"{other}` must {wanted}" in capsys.readouterr().err
 
 
 def test_two_names_are_wanted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -210,7 +210,7 @@ def test_only_pictures_are_written(tmp_path: Path, image: Array) -> None:
 def test_an_impossible_name_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="must be a file, got nothing there"):
         read_image(tmp_path / name)
-    with pytest.raises((InputError, StepError), match=r"must lie in an existing folder|null byte|failed: "):
+    with pytest.raises((InputError, StepError), match=r"must lie in an existing folder|null byte|at most 255 bytes"):
         write_image(GREY, tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
