@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -35,6 +36,14 @@ class Cluster:
 
     def workers(self) -> list[int]:
         return processes_of(self.session, "ray::_carry_out")
+
+    def kill_a_worker(self) -> bool:
+        """Kill a worker, if one is at work at this moment."""
+        for worker in self.workers():
+            with suppress(ProcessLookupError):
+                os.kill(worker, signal.SIGKILL)
+                return True
+        return False
 
     def second_node_works(self) -> bool:
         return self.raylet in map(parent_of, self.workers())
@@ -102,7 +111,8 @@ def test_a_run_interrupted_and_then_killed_goes_on_from_there(cluster: Cluster, 
 def test_a_killed_worker_and_then_a_killed_node_lose_no_row(cluster: Cluster, out: Path, undisturbed: bytes) -> None:
     run = cluster.start(out)
     run.until(40)
-    os.kill(cluster.workers()[0], signal.SIGKILL)
+    # Ray names a worker by what it does, so that between two trials none has the name.
+    until(cluster.kill_a_worker)
     run.until(80)
     until(cluster.second_node_works)
     os.kill(cluster.raylet, signal.SIGKILL)

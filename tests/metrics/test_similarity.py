@@ -144,7 +144,7 @@ def test_colour_depth_and_channels_do_not_matter(page: Array) -> None:
 
 
 @settings(max_examples=10, deadline=None)
-@given(st.integers(40, 900), st.integers(40, 900))
+@given(st.integers(50, 900), st.integers(50, 900))
 def test_pictures_are_compared_at_the_fields_area(height: int, width: int) -> None:
     scan = np.zeros((height, width), np.uint8)
     restored, resized_scan = compared(np.zeros((50, 70), np.uint8), scan)

@@ -20,6 +20,7 @@ from experiments.reporting.claims.measures import Evidence
 from experiments.studies.falling_sheet import FallingSheet, fallen, vertex_error
 
 REPORTS = Path(__file__).resolve().parents[2] / "reports"
+_FEW = ("corner_distance", "ocr_misses", "integrators", "settling")
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _FLAGS = (
     "--no-sandbox",
@@ -60,14 +61,25 @@ def runs() -> list[Run]:
 @pytest.fixture(scope="session")
 def report(sheet: FallingSheet, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The report; the first process that asks makes it, the others wait."""
+    return _made("report", read_runs(REPORTS), sheet, tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def short_report(runs: list[Run], sheet: FallingSheet, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of a few runs that has every kind of part, for what walks through all of it."""
+    few = [run for run in runs if run.name in _FEW]
+    assert len(few) == len(_FEW)
+    return _made("short", few, sheet, tmp_path_factory)
+
+
+def _made(name: str, runs: list[Run], sheet: FallingSheet, tmp_path_factory: pytest.TempPathFactory) -> Path:
     base = tmp_path_factory.getbasetemp()
     base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    path = base / "report.html"
-    with (base / "report.lock").open("w") as lock:
+    path = base / f"{name}.html"
+    with (base / f"{name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not path.is_file():
-            text = document(read_runs(REPORTS), judged_claims(Evidence(REPORTS)), sheet)
-            path.write_text(text, encoding="utf-8")
+            path.write_text(document(runs, judged_claims(Evidence(REPORTS)), sheet), encoding="utf-8")
     return path
 
 
