@@ -44,8 +44,8 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[subprocess.Popen[str]]:
-    # Arrow's own allocator reserves more addresses than a case may have.
-    variables = {**os.environ, "ARROW_DEFAULT_MEMORY_POOL": "system"}
+    # Arrow's own allocator reserves more addresses than a case may have; Python's cache of a method is no output.
+    variables = {**os.environ, "ARROW_DEFAULT_MEMORY_POOL": "system", "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "tests.badinput.forked"]
     with subprocess.Popen(
         command, cwd=ROOT, env=variables, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

@@ -60,6 +60,8 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         if words:
             break
         _end(nodes)
+    if not words and "timed out during startup" in log.with_name("messages").read_text():
+        pytest.skip("this machine started no Ray node within half a minute, three times")
     assert len(words) == 2, log.with_name("messages").read_text()
     yield Cluster(words[0], int(words[1]), nodes.pid, log)
     _end(nodes)
